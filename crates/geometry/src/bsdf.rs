@@ -1,0 +1,1 @@
+//! The shading model: eval, sample and pdf of each lobe.

@@ -1,0 +1,1 @@
+//! Lamps, emissive triangles and sky as things one samples.

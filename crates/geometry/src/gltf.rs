@@ -1,0 +1,1 @@
+//! glTF file to scene, cameras and warnings.

@@ -1,0 +1,1 @@
+//! Reflect, refract, Fresnel: both passes send rays on through glass.

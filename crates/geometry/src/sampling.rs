@@ -1,0 +1,1 @@
+//! Square to disc, hemisphere, triangle, with the pdf beside each; seeded streams of numbers.

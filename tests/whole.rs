@@ -1,0 +1,1 @@
+//! Whole-system tests; each module asks one kind of question.

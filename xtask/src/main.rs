@@ -1,0 +1,3 @@
+//! Our chores, as `cargo xtask NAME`.
+
+fn main() {}
