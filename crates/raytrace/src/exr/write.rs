@@ -1,0 +1,261 @@
+//! Film to OpenEXR: one part, named layers, half where that loses nothing worth having.
+
+use super::{Image, Metadata};
+use crate::error::Error;
+use crate::film::{Film, Pixel};
+use crate::output::write_atomically;
+use ::exr::prelude::*;
+use geometry::Rgb;
+use half::f16;
+use std::io::Cursor;
+use std::path::Path;
+
+/// Writes all layers of `film` to `path`, atomically.
+///
+/// Beauty is R, G, B, A without a prefix, so that every viewer shows it; then `direct`, `indirect`, `specular`,
+/// `emission` (their sum is the beauty), `albedo`, `irradiance` as .R .G .B, `normal` and `position` as .X .Y .Z,
+/// `depth.Z` and `variance.Y`. Light is in cd/m², irradiance in lx, lengths in metres.
+pub fn write(film: &Film, metadata: &Metadata, path: &Path) -> std::result::Result<(), Error> {
+    type Get = fn(&Pixel) -> [f32; 3];
+    const RGB: [&str; 3] = ["R", "G", "B"];
+    const XYZ: [&str; 3] = ["X", "Y", "Z"];
+    let triples: [(&str, [&str; 3], Format, Get); 8] = [
+        ("direct", RGB, Format::Fitting, |p| p.direct.to_array()),
+        ("indirect", RGB, Format::Fitting, |p| p.indirect.to_array()),
+        ("specular", RGB, Format::Fitting, |p| p.specular.to_array()),
+        ("emission", RGB, Format::Fitting, |p| p.emission.to_array()),
+        ("albedo", RGB, Format::Fitting, |p| p.albedo.to_array()),
+        ("irradiance", RGB, Format::Fitting, |p| p.irradiance.to_array()),
+        ("normal", XYZ, Format::Fitting, |p| p.normal.to_array()),
+        ("position", XYZ, Format::Float, |p| p.position.to_array()),
+    ];
+    let beauty = film.beauty();
+    let mut layers = vec![Layer {
+        names: ["R", "G", "B", "A"].map(String::from).to_vec(),
+        values: (0..3)
+            .map(|c| beauty.iter().map(|b| b[c]).collect())
+            .chain([film.pixels.iter().map(|p| p.alpha).collect()])
+            .collect(),
+        format: Format::Fitting,
+    }];
+    for (name, channels, format, get) in triples {
+        layers.push(Layer {
+            names: channels.map(|c| format!("{name}.{c}")).to_vec(),
+            values: (0..3).map(|c| film.pixels.iter().map(|p| get(p)[c]).collect()).collect(),
+            format,
+        });
+    }
+    let scalar = |name: &str, format, get: fn(&Pixel) -> f32| Layer {
+        names: vec![name.into()],
+        values: vec![film.pixels.iter().map(get).collect()],
+        format,
+    };
+    layers.push(scalar("depth.Z", Format::Float, |p| p.depth));
+    layers.push(scalar("variance.Y", Format::Fitting, |p| p.variance));
+    save(layers, film.width, film.height, metadata, path)
+}
+
+/// Writes a plain picture as R, G, B to `path`, atomically.
+pub fn write_rgb(image: &Image, metadata: &Metadata, path: &Path) -> std::result::Result<(), Error> {
+    let channel = |f: fn(&Rgb) -> f32| image.pixels.iter().map(f).collect();
+    let layer = Layer {
+        names: ["R", "G", "B"].map(String::from).to_vec(),
+        values: vec![channel(|c| c.r), channel(|c| c.g), channel(|c| c.b)],
+        format: Format::Fitting,
+    };
+    save(vec![layer], image.width, image.height, metadata, path)
+}
+
+/// How the numbers of a layer are stored.
+#[derive(Clone, Copy, PartialEq)]
+enum Format {
+    /// 32 bits.
+    Float,
+    /// 16 bits where they can hold the layer, else 32.
+    Fitting,
+}
+
+/// Channels that share a format: viewers expect R, G and B of one layer to be of one kind.
+struct Layer {
+    names: Vec<String>,
+    values: Vec<Vec<f32>>,
+    format: Format,
+}
+
+impl Layer {
+    /// Whether half floats hold this layer: nothing above their largest number, 65504, and its brightest value
+    /// at least 2⁻⁴, so that a thousandth of it is still above 2⁻¹⁴, below which halves lose digits.
+    fn fits_half(&self) -> bool {
+        let peak = self.values.iter().flatten().fold(0f32, |m, v| m.max(v.abs()));
+        peak == 0.0 || (0.0625..=65504.0).contains(&peak)
+    }
+
+    fn into_channels(self) -> Vec<AnyChannel<FlatSamples>> {
+        let half = self.format == Format::Fitting && self.fits_half();
+        let samples = |values: Vec<f32>| match half {
+            true => FlatSamples::F16(values.into_iter().map(f16::from_f32).collect()),
+            false => FlatSamples::F32(values),
+        };
+        self.names.iter().zip(self.values).map(|(n, v)| AnyChannel::new(n.as_str(), samples(v))).collect()
+    }
+}
+
+fn save(
+    layers: Vec<Layer>,
+    width: u32,
+    height: u32,
+    metadata: &Metadata,
+    path: &Path,
+) -> std::result::Result<(), Error> {
+    let encode_error = |reason: String| Error::Encode { path: path.into(), reason };
+    if width == 0 || height == 0 {
+        return Err(encode_error("it has no pixels".into()));
+    }
+    let size = Vec2(width as usize, height as usize);
+    let channels = AnyChannels::sort(layers.into_iter().flat_map(Layer::into_channels).collect());
+    let mut own = LayerAttributes {
+        software_name: Some(Text::from(concat!("twolight ", env!("CARGO_PKG_VERSION")))),
+        // OpenEXR multiplies row vectors from the left, glam column vectors from the right: the same sixteen
+        // numbers in the same order.
+        world_to_camera: metadata.world_to_camera.map(|m| m.to_cols_array()),
+        ..LayerAttributes::default()
+    };
+    for (name, value) in &metadata.texts {
+        own.other.insert(text(&format!("twolight:{name}")), AttributeValue::Text(text(value)));
+    }
+    own.other.insert(text("colorInteropID"), AttributeValue::Text(text("lin_rec709_scene")));
+    let encoding = Encoding {
+        compression: Compression::ZIP16,
+        blocks: Blocks::ScanLines,
+        // In order, so that threads that finish in another order still write the same file.
+        line_order: LineOrder::Increasing,
+    };
+    let mut image = ::exr::image::Image::from_layer(::exr::image::Layer::new(size, own, encoding, channels));
+    image.attributes.chromaticities = Some(::exr::meta::attribute::Chromaticities {
+        red: Vec2(0.64, 0.33),
+        green: Vec2(0.30, 0.60),
+        blue: Vec2(0.15, 0.06),
+        white: Vec2(0.3127, 0.3290),
+    });
+    let mut bytes = Vec::new();
+    image.write().to_buffered(Cursor::new(&mut bytes)).map_err(|e| encode_error(e.to_string()))?;
+    if sort_attributes(&mut bytes).is_none() {
+        return Err(encode_error("its header is not in order".into()));
+    }
+    write_atomically(path, &bytes)
+}
+
+/// UTF-8 as it stands (OpenEXR since 2.0 reads text so); the crate's own conversion panics beyond Latin-1.
+fn text(s: &str) -> Text {
+    Text::from_slice_unchecked(s.as_bytes())
+}
+
+/// Puts the attributes of a one-part file in the order of their names. The crate keeps ours in a hash map whose
+/// order changes from run to run, and the same picture shall give the same bytes.
+///
+/// The header follows 8 bytes of magic number and version: name, 0, type, 0, length (4 bytes), value; and ends
+/// with an empty name (OpenEXR File Layout, "Header attributes"). Its length does not change, so the offsets of
+/// the scan lines stay true. `None` when the bytes are not such a header.
+fn sort_attributes(bytes: &mut [u8]) -> Option<()> {
+    const START: usize = 8;
+    let mut attributes: Vec<&[u8]> = Vec::new();
+    let mut at = START;
+    while *bytes.get(at)? != 0 {
+        let name = bytes[at..].iter().position(|&b| b == 0)? + 1;
+        let kind = bytes.get(at + name..)?.iter().position(|&b| b == 0)? + 1;
+        let value = at + name + kind;
+        let length = u32::from_le_bytes(bytes.get(value..value + 4)?.try_into().ok()?) as usize;
+        attributes.push(bytes.get(at..value + 4 + length)?);
+        at = value + 4 + length;
+    }
+    // No name is another's beginning with the 0 that ends it, so comparing whole records compares names.
+    attributes.sort_unstable();
+    let sorted = attributes.concat();
+    bytes[START..at].copy_from_slice(&sorted);
+    Some(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{read_layer, read_rgb};
+    use super::*;
+    use geometry::Vec3;
+    use geometry::math::Mat4;
+
+    /// A small film whose every layer differs from pixel to pixel.
+    fn film() -> Film {
+        let mut film = Film::new(7, 5);
+        for (i, p) in film.pixels.iter_mut().enumerate() {
+            let v = i as f32;
+            p.direct = Rgb::new(v, 0.5 * v, 2.0);
+            p.indirect = Rgb::splat(0.25 * v);
+            p.emission = Rgb::splat(if i == 3 { 1e6 } else { 0.0 });
+            p.alpha = 1.0;
+            p.normal = Vec3::new(0.0, -1.0, 0.0);
+            p.depth = 1.0 + v / 3.0;
+            p.position = Vec3::new(v / 7.0, -v, 1e5);
+        }
+        film
+    }
+
+    fn saved(film: &Film, metadata: &Metadata) -> (tempfile::TempDir, std::path::PathBuf) {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("film.exr");
+        write(film, metadata, &path).unwrap();
+        (dir, path)
+    }
+
+    #[test]
+    fn layers_come_back_and_add_up() {
+        let film = film();
+        let (_dir, path) = saved(&film, &Metadata::default());
+        let beauty = read_rgb(&path).unwrap();
+        assert_eq!((beauty.width, beauty.height), (7, 5));
+        let layer = |name| read_layer(&path, name).unwrap();
+        let parts = ["direct", "indirect", "specular", "emission"].map(layer);
+        for (i, b) in beauty.pixels.iter().enumerate() {
+            let sum: Rgb = parts.iter().map(|l| l.pixels[i]).sum();
+            assert!((*b - sum).map(f32::abs).max_channel() <= 1e-3 * b.max_channel(), "{i}: {b:?} {sum:?}");
+        }
+        assert_eq!(beauty.pixels[3].r, film.pixels[3].beauty().r, "a lamp above 65504 is stored as float");
+        let position = layer("position");
+        assert_eq!(position.pixels[6].to_array(), film.pixels[6].position.to_array());
+        assert_eq!(layer("depth").pixels[6].r, film.pixels[6].depth);
+        assert_eq!(layer("normal").pixels[0], Rgb::new(0.0, -1.0, 0.0));
+    }
+
+    #[test]
+    fn half_is_chosen_only_where_it_keeps_the_digits() {
+        let layer =
+            |peak: f32| Layer { names: vec![], values: vec![vec![0.0, -peak]], format: Format::Fitting };
+        for (peak, half) in [(0.0, true), (1.0, true), (65504.0, true), (65505.0, false), (1e-3, false)] {
+            assert_eq!(layer(peak).fits_half(), half, "{peak}");
+        }
+    }
+
+    #[test]
+    fn the_same_picture_gives_the_same_bytes_with_its_attributes_in_order() {
+        let mut metadata = Metadata { world_to_camera: Some(Mat4::IDENTITY), ..Metadata::default() };
+        for i in 0..20 {
+            metadata.push(format!("key {i:02}"), "Zürich → 東京");
+        }
+        let read = || {
+            let (_dir, path) = saved(&film(), &metadata);
+            std::fs::read(path).unwrap()
+        };
+        let first = read();
+        assert!((0..4).all(|_| read() == first));
+        let find = |s: &str| first.windows(s.len()).position(|w| w == s.as_bytes());
+        assert!(find("colorInteropID") < find("twolight:key 00"));
+        assert!(find("twolight:key 00") < find("twolight:key 19") && find("東京").is_some());
+    }
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("old.exr");
+        std::fs::write(&path, b"precious").unwrap();
+        assert!(write(&Film::new(0, 4), &Metadata::default(), &path).is_err());
+        assert_eq!(std::fs::read(&path).unwrap(), b"precious");
+    }
+}
