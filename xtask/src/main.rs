@@ -1,3 +1,37 @@
 //! Our chores, as `cargo xtask NAME`.
 
-fn main() {}
+mod scenes;
+
+use anyhow::Result;
+use clap::{Parser, Subcommand};
+use std::path::{Path, PathBuf};
+
+/// Chores of the twolight repository.
+#[derive(Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask")]
+struct Args {
+    #[command(subcommand)]
+    chore: Chore,
+}
+
+#[derive(Subcommand)]
+enum Chore {
+    /// Write the scenes that a function describes into assets/
+    Scenes {
+        /// Write nothing; fail if a file in assets/ differs from what its function gives
+        #[arg(long)]
+        check: bool,
+    },
+}
+
+fn main() -> Result<()> {
+    match Args::parse().chore {
+        Chore::Scenes { check: false } => scenes::write(&root().join("assets")),
+        Chore::Scenes { check: true } => scenes::check(&root().join("assets")),
+    }
+}
+
+/// The repository's root: chores work from any folder within it.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("xtask lies in the root").to_path_buf()
+}
