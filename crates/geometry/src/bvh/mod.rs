@@ -1,7 +1,24 @@
 //! What a ray meets first, and whether it meets anything.
+//!
+//! obvhs builds a binary tree; ours is the rest: the tree is folded into nodes of eight boxes over blocks of four
+//! triangles, and traversed by a portable kernel or a vector one, chosen once at run time. All kernels do the same
+//! IEEE operations in the same order, so they return the same bits.
+//!
+//! The triangle test is watertight (Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013):
+//! no ray passes between two triangles that share an edge or a corner.
+
+mod binary;
+mod items;
+mod portable;
+mod prepared;
+#[cfg(test)]
+mod tests;
+mod wide;
 
 use crate::Mesh;
 use crate::math::Vec3;
+use prepared::Prepared;
+use wide::Tree;
 
 /// A half-line, or a piece of one: `origin + t · direction` for t in (t_min, t_max).
 #[derive(Clone, Copy, Debug)]
@@ -10,7 +27,7 @@ pub struct Ray {
     pub origin: Vec3,
     /// Unit length by convention, so that t is in metres.
     pub direction: Vec3,
-    /// Nothing at or before this counts.
+    /// Nothing at or before this counts; ≥ 0.
     pub t_min: f32,
     /// Nothing at or beyond this counts.
     pub t_max: f32,
@@ -43,21 +60,27 @@ pub struct Hit {
 
 /// The search tree over all triangles of a mesh.
 #[derive(Debug)]
-pub struct Bvh {}
+pub struct Bvh {
+    tree: Tree,
+}
 
 impl Bvh {
     /// Builds the tree; triangles without area or with a corner that is not finite are left out.
-    pub fn build(_mesh: &Mesh) -> Bvh {
-        todo!("bvh")
+    pub fn build(mesh: &Mesh) -> Bvh {
+        let (items, order) = items::items(mesh);
+        let binary = binary::build(mesh, &items, order);
+        Bvh { tree: wide::fold(mesh, binary) }
     }
 
     /// The nearest triangle that the ray meets within (t_min, t_max), from either side.
-    pub fn closest_hit(&self, _ray: &Ray) -> Option<Hit> {
-        todo!("bvh")
+    ///
+    /// Of several at exactly the same `t` the one with the smallest index. A ray that is not finite meets nothing.
+    pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        portable::closest_hit(&self.tree, &Prepared::new(ray)?)
     }
 
     /// Whether the ray meets any triangle within (t_min, t_max).
-    pub fn occluded(&self, _ray: &Ray) -> bool {
-        todo!("bvh")
+    pub fn occluded(&self, ray: &Ray) -> bool {
+        Prepared::new(ray).is_some_and(|ray| portable::occluded(&self.tree, &ray))
     }
 }

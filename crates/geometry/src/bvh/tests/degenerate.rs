@@ -1,0 +1,97 @@
+//! Inputs that trees choke on.
+
+use super::shapes::{both, mesh, random_soup, soup};
+use super::*;
+use std::time::Instant;
+
+#[test]
+fn nothing_is_met_in_an_empty_mesh() {
+    let bvh = Bvh::build(&Mesh::default());
+    assert_eq!(bvh.closest_hit(&Ray::new(Vec3::ZERO, Vec3::Z)), None);
+    assert!(!bvh.occluded(&Ray::new(Vec3::ZERO, Vec3::Z)));
+}
+
+#[test]
+fn one_triangle() {
+    let bvh = Bvh::build(&mesh(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]));
+    let above = Ray::new(Vec3::new(0.25, 0.5, 1.0), Vec3::NEG_Z);
+    assert_eq!(bvh.closest_hit(&above), Some(Hit { t: 1.0, triangle: 0, u: 0.25, v: 0.5 }));
+    assert!(!bvh.occluded(&Ray { direction: Vec3::Z, ..above }));
+    // In its own plane it is not there.
+    assert!(!bvh.occluded(&Ray::new(Vec3::new(-1.0, 0.2, 0.0), Vec3::X)));
+}
+
+#[test]
+fn rays_that_are_not_rays_meet_nothing() {
+    let bvh = Bvh::build(&random_soup(100, 1.0, &mut Random(1)));
+    for bad in [f32::NAN, f32::INFINITY] {
+        assert_eq!(bvh.closest_hit(&Ray::new(Vec3::splat(bad), Vec3::Z)), None);
+        assert_eq!(bvh.closest_hit(&Ray::new(Vec3::ZERO, Vec3::new(0.0, bad, 1.0))), None);
+        assert_eq!(bvh.closest_hit(&Ray { t_min: bad, ..Ray::new(Vec3::ZERO, Vec3::Z) }), None);
+    }
+    assert_eq!(bvh.closest_hit(&Ray { t_max: f32::NAN, ..Ray::new(Vec3::ZERO, Vec3::Z) }), None);
+    assert_eq!(bvh.closest_hit(&Ray::new(Vec3::ZERO, Vec3::ZERO)), None);
+}
+
+#[test]
+fn bad_triangles_are_left_out() {
+    let good = random_soup(200, 0.3, &mut Random(2));
+    let mut bad = Vec::new();
+    for x in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        bad.push([Vec3::splat(x), Vec3::X, Vec3::Y]);
+        bad.push([Vec3::ZERO, Vec3::new(0.0, x, 0.0), Vec3::Y]);
+    }
+    bad.extend([[Vec3::X; 3], [Vec3::ZERO, Vec3::X, 2.0 * Vec3::X], [Vec3::ZERO, Vec3::ZERO, Vec3::X]]);
+    let without = Bvh::build(&good);
+    let with = Bvh::build(&both(good, soup(&bad)));
+    let random = &mut Random(3);
+    for _ in 0..2000 {
+        let ray = Ray::new(2.0 * random.cube(), random.direction());
+        assert_eq!(with.closest_hit(&ray), without.closest_hit(&ray));
+    }
+}
+
+#[test]
+fn huge_coordinates_build() {
+    let far = f32::MAX;
+    let huge =
+        soup(&[[Vec3::ZERO, far * Vec3::X, far * Vec3::Y], [-far * Vec3::ONE, far * Vec3::X, Vec3::Z]]);
+    let bvh = Bvh::build(&both(random_soup(100, 0.3, &mut Random(4)), huge));
+    bvh.closest_hit(&Ray::new(Vec3::splat(0.5), Vec3::NEG_Z)); // what it meets overflows; it must only return
+}
+
+#[test]
+fn coincident_triangles_build_fast_and_give_the_first() {
+    for triangle in [[Vec3::ZERO, Vec3::X, Vec3::Y], [Vec3::ONE, Vec3::new(3.0, 0.1, 0.2), Vec3::Z]] {
+        let begin = Instant::now();
+        let bvh = Bvh::build(&soup(&vec![triangle; 100_000]));
+        assert!(begin.elapsed().as_secs_f32() < 2.0, "{:?}", begin.elapsed());
+        let centre = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
+        let ray = Ray::new(centre + Vec3::Z, Vec3::NEG_Z);
+        assert_eq!(bvh.closest_hit(&ray).map(|h| h.triangle), Some(0));
+        assert!(!bvh.occluded(&Ray { direction: Vec3::Z, ..ray }));
+    }
+}
+
+#[test]
+fn concentric_triangles_build_fast() {
+    // One centroid, 50 000 sizes.
+    let begin = Instant::now();
+    let triangles: Vec<[Vec3; 3]> =
+        (1..=50_000).map(|i| [Vec3::X, Vec3::Y, -Vec3::X - Vec3::Y].map(|p| p * i as f32)).collect();
+    let bvh = Bvh::build(&soup(&triangles));
+    assert!(begin.elapsed().as_secs_f32() < 2.0, "{:?}", begin.elapsed());
+    assert!(bvh.occluded(&Ray::new(Vec3::new(0.1, 0.1, 1.0), Vec3::NEG_Z)));
+}
+
+#[test]
+fn an_even_row_builds_fast() {
+    // Every pair of neighbours has a union of the same size: a tie for whoever clusters by size.
+    let begin = Instant::now();
+    let triangles: Vec<[Vec3; 3]> =
+        (0..=65_536).map(|i| [Vec3::ZERO, Vec3::Y, Vec3::Z].map(|p| p + i as f32 * Vec3::X)).collect();
+    let bvh = Bvh::build(&soup(&triangles));
+    assert!(begin.elapsed().as_secs_f32() < 2.0, "{:?}", begin.elapsed());
+    let ray = Ray { t_min: 0.5, ..Ray::new(Vec3::new(1000.0, 0.2, 0.2), Vec3::X) };
+    assert_eq!(bvh.closest_hit(&ray).map(|h| (h.triangle, h.t)), Some((1001, 1.0)));
+}

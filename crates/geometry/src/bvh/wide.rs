@@ -1,0 +1,127 @@
+//! The tree that rays see: nodes of eight boxes, blocks of four triangles, both lane by lane.
+
+use super::binary::{self, Binary, LEAF};
+use crate::Mesh;
+
+/// Children of a node.
+pub(super) const WIDTH: usize = 8;
+/// Triangles of a block.
+pub(super) const LANES: usize = LEAF as usize;
+/// Set in a reference to a block; the other bits count blocks, or nodes.
+pub(super) const BLOCK: u32 = 1 << 31;
+/// Levels below which obvhs's tree is followed no further but halved, so that the depth is bounded.
+const DEEP: u32 = 40;
+/// References a traversal may have to hold: at each level all children but the one it goes on with. Halving 2³²
+/// triangles down to blocks takes 30 binary levels; each level of wide nodes undoes at least one.
+pub(super) const STACK: usize = (DEEP as usize + 30) * (WIDTH - 1) + 1;
+
+/// Eight boxes: `bounds[0]` the least corners, `bounds[1]` the greatest, each by axis, then by child.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Node {
+    /// Corners of the boxes. A child that is not there has an inside-out box, which no ray meets.
+    pub bounds: [[[f32; WIDTH]; 3]; 2],
+    /// Where the children are.
+    pub child: [u32; WIDTH],
+}
+
+/// Four triangles.
+#[derive(Clone, Debug)]
+#[repr(C, align(16))]
+pub(super) struct Block {
+    /// Corners: by corner, by axis, by triangle. All zero where there is no triangle: no area, no hit.
+    pub corners: [[[f32; LANES]; 3]; 3],
+    /// Their indices in the mesh.
+    pub triangle: [u32; LANES],
+}
+
+/// The tree. Node 0 is the root; an empty mesh has a root without children.
+#[derive(Debug)]
+pub(super) struct Tree {
+    /// All nodes.
+    pub nodes: Vec<Node>,
+    /// All blocks.
+    pub blocks: Vec<Block>,
+}
+
+/// Folds a binary tree into a wide one: each node opens its child of largest area until it has eight.
+pub(super) fn fold(mesh: &Mesh, mut binary: Binary) -> Tree {
+    let mut tree = Tree { nodes: vec![Node::empty()], blocks: Vec::with_capacity(binary.order.len() / 2) };
+    // Depth first, so that a subtree is together in memory.
+    let mut stack = Vec::new();
+    if !binary.nodes.is_empty() {
+        stack.push((0, 0, 0));
+    }
+    while let Some((from, to, depth)) = stack.pop() {
+        if depth == DEEP {
+            let node = binary.nodes[from as usize];
+            binary.halve(mesh, from, node.first, node.count);
+        }
+        let children = open(&binary, from);
+        for (lane, &child) in children.iter().enumerate().rev() {
+            let source = binary.nodes[child as usize];
+            let reference = if source.children.is_some() {
+                tree.nodes.push(Node::empty());
+                let at = tree.nodes.len() as u32 - 1;
+                stack.push((child, at, depth + 1));
+                at
+            } else {
+                let range = source.first as usize..(source.first + source.count) as usize;
+                tree.blocks.push(Block::new(mesh, &binary.order[range]));
+                BLOCK | (tree.blocks.len() as u32 - 1)
+            };
+            tree.nodes[to as usize].set(lane, &source.bounds, reference);
+        }
+    }
+    if tree.blocks.is_empty() {
+        tree.blocks.push(Block::new(mesh, &[])); // what the lanes without a child refer to
+    }
+    tree
+}
+
+/// Up to eight descendants of `at` that together hold what it holds.
+fn open(binary: &Binary, at: u32) -> Vec<u32> {
+    let mut children = vec![at];
+    while children.len() < WIDTH {
+        let area = |&(_, &c): &(usize, &u32)| binary.nodes[c as usize].bounds.half_area();
+        let largest = children
+            .iter()
+            .enumerate()
+            .filter(|&(_, &c)| binary.nodes[c as usize].children.is_some())
+            .max_by(|a, b| area(a).total_cmp(&area(b)));
+        let Some((i, &child)) = largest else { break };
+        let Some([left, right]) = binary.nodes[child as usize].children else { break };
+        children[i] = left;
+        children.push(right);
+    }
+    children
+}
+
+impl Node {
+    fn empty() -> Node {
+        Node { bounds: [[[f32::INFINITY; WIDTH]; 3], [[f32::NEG_INFINITY; WIDTH]; 3]], child: [BLOCK; WIDTH] }
+    }
+
+    fn set(&mut self, lane: usize, bounds: &binary::Bounds, child: u32) {
+        for axis in 0..3 {
+            self.bounds[0][axis][lane] = bounds.lo[axis];
+            self.bounds[1][axis][lane] = bounds.hi[axis];
+        }
+        self.child[lane] = child;
+    }
+}
+
+impl Block {
+    fn new(mesh: &Mesh, triangles: &[u32]) -> Block {
+        let mut block = Block { corners: [[[0.0; LANES]; 3]; 3], triangle: [u32::MAX; LANES] };
+        for (lane, &t) in triangles.iter().enumerate() {
+            block.triangle[lane] = t;
+            for (corner, p) in mesh.corners(t).into_iter().enumerate() {
+                for axis in 0..3 {
+                    block.corners[corner][axis][lane] = p[axis];
+                }
+            }
+        }
+        block
+    }
+}
