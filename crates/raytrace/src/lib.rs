@@ -1,9 +1,13 @@
 //! What the eye sees: film, files and the measure of a picture's error.
 
+pub mod difference;
 pub mod error;
 pub mod exr;
 pub mod film;
+pub mod flip;
+pub mod metrics;
 pub mod output;
+pub mod tonemap;
 
 pub use error::Error;
 pub use film::{Film, Pixel};

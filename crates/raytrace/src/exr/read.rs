@@ -2,10 +2,11 @@
 
 use super::Image;
 use crate::error::Error;
+use crate::metrics::Reference;
 use ::exr::prelude::*;
 use geometry::Rgb;
 use std::io::Cursor;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The most samples (pixels × channels, over all parts) that a file may claim: 2³⁰, or 4 GiB as floats.
 /// A header of a few bytes must not make us ask the system for all its memory.
@@ -25,6 +26,21 @@ pub fn read_rgb(path: &Path) -> std::result::Result<Image, Error> {
         wanted: "R, G, B".into(),
         present: describe(&parts),
     })
+}
+
+/// Reads a reference, and its two independent halves if they lie beside it: `box.a.exr` and `box.b.exr` beside
+/// `box.exr`.
+pub fn read_reference(path: &Path) -> std::result::Result<Reference, Error> {
+    let beside = |half: &str| match path.extension() {
+        Some(e) if e == "exr" => path.with_extension(format!("{half}.exr")),
+        _ => PathBuf::from(format!("{}.{half}.exr", path.display())),
+    };
+    let (a, b) = (beside("a"), beside("b"));
+    let halves = match a.is_file() && b.is_file() {
+        true => Some((read_rgb(&a)?, read_rgb(&b)?)),
+        false => None,
+    };
+    Ok(Reference { mean: read_rgb(path)?, halves })
 }
 
 /// Reads the layer `name`: its R, G, B, or X, Y, Z, or its only channel three times. A layer is a prefix of the
@@ -140,7 +156,7 @@ mod tests {
             let _ = decode(&good[..cut]);
         }
         for at in 0..good.len() {
-            for value in [0x7f, 0xff, good[at] ^ 1] {
+            for value in [0xff, good[at] ^ 1] {
                 let mut bad = good.clone();
                 bad[at] = value;
                 let _ = decode(&bad);
