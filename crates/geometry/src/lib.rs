@@ -13,6 +13,7 @@ pub mod math;
 pub mod mesh;
 pub mod optics;
 pub mod photometry;
+pub mod polygon;
 pub mod rgb;
 pub mod sampling;
 pub mod scene;
@@ -20,9 +21,11 @@ pub mod sky;
 pub mod surface;
 pub mod texture;
 pub mod triangle;
+pub mod world;
 
 pub use bvh::{Bvh, Hit, Ray};
 pub use camera::{Camera, Projection};
+pub use emitter::Emitters;
 pub use math::{Vec2, Vec3};
 pub use mesh::{Mesh, Part};
 pub use rgb::Rgb;
@@ -30,3 +33,4 @@ pub use scene::{AlphaMode, Light, LightKind, Material, MaterialId, Scene, Textur
 pub use sky::Sky;
 pub use surface::Surface;
 pub use texture::Texture;
+pub use world::World;

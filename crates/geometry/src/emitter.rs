@@ -1,1 +1,0 @@
-//! Lamps, emissive triangles and sky as things one samples.

@@ -1,0 +1,157 @@
+//! Which light for which point, and how likely: the density of the whole draw.
+
+use super::{EmitterKind, Emitters, LightSample};
+use crate::math::{Vec3, to_world};
+use crate::{Scene, Sky};
+use std::f32::consts::{FRAC_1_PI, TAU};
+
+impl Emitters {
+    /// One way to one light for the point `p`; `None` when the draw meets a light that sends nothing there.
+    ///
+    /// - `n`: unit shading normal of a surface that only reflects, so that lights below its horizon are not drawn;
+    ///   zero for no preference.
+    /// - `u`: in [0, 1)³; the first chooses the light.
+    pub fn sample(&self, scene: &Scene, p: Vec3, n: Vec3, u: [f32; 3]) -> Option<LightSample> {
+        let (light, probability) = self.choose(p, n, u[0])?;
+        let u = [u[1], u[2]];
+        let s = match (&self.lights[light as usize], n != Vec3::ZERO) {
+            (EmitterKind::Sky(Sky::Constant(radiance)), true) => {
+                let (sin, cos) = (TAU * u[1]).sin_cos();
+                let (r, z) = (u[0].sqrt(), (1.0 - u[0]).sqrt());
+                let wi = to_world(Vec3::new(r * cos, r * sin, z), n);
+                let pdf = wi.dot(n) * FRAC_1_PI;
+                (pdf > 0.0).then_some(LightSample {
+                    wi,
+                    distance: f32::INFINITY,
+                    radiance: *radiance,
+                    pdf,
+                    delta: false,
+                    light,
+                })
+            }
+            _ => self.sample_light(scene, light, p, u),
+        };
+        s.map(|s| LightSample { pdf: s.pdf * probability, ..s }).filter(|s| s.pdf > 0.0)
+    }
+
+    /// The density (1/sr) with which [`Emitters::sample`] draws `point` on an emissive `triangle` for a receiver at
+    /// `p`; what multiple importance sampling weighs a ray by that met the lamp by itself. 0 for a dark triangle.
+    pub fn pdf_triangle(&self, p: Vec3, n: Vec3, triangle: u32, point: Vec3) -> f32 {
+        let Some(light) = self.light_of_triangle(triangle) else { return 0.0 };
+        match &self.lights[light as usize] {
+            EmitterKind::Polygon(shape) | EmitterKind::Textured(shape) => {
+                let pdf = shape.pdf(p, point);
+                if pdf > 0.0 { pdf * self.tree_share * self.tree.probability(light, p, n) } else { 0.0 }
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// The density (1/sr) with which [`Emitters::sample`] draws the sky in the unit direction `wi`.
+    pub fn pdf_sky(&self, n: Vec3, wi: Vec3) -> f32 {
+        // The sky, when there is one, is the last light.
+        match (self.lights.last(), self.far.last()) {
+            (Some(EmitterKind::Sky(Sky::Constant(_))), Some((_, share))) if n != Vec3::ZERO => {
+                share * wi.dot(n).max(0.0) * FRAC_1_PI
+            }
+            (Some(EmitterKind::Sky(sky)), Some((_, share))) => share * sky.pdf(wi),
+            _ => 0.0,
+        }
+    }
+
+    /// A light for `p`, and the probability of that choice.
+    fn choose(&self, p: Vec3, n: Vec3, mut u: f32) -> Option<(u32, f32)> {
+        if u < self.tree_share {
+            let (light, probability) = self.tree.choose(p, n, u / self.tree_share)?;
+            return Some((light, probability * self.tree_share));
+        }
+        u -= self.tree_share;
+        for &(light, share) in &self.far {
+            if u < share {
+                return Some((light, share));
+            }
+            u -= share;
+        }
+        // Rounding may leave a little beyond the last.
+        self.far.last().copied()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::emitter::testing::*;
+    use crate::polygon::polygon_irradiance;
+    use crate::scene::{Light, LightKind};
+    use crate::{Mesh, Rgb};
+    use std::f32::consts::PI;
+
+    /// Unshadowed irradiance by quasi-random draws; each carries the density that is told of it.
+    fn irradiance(scene: &Scene, p: Vec3, n: Vec3) -> f32 {
+        let emitters = Emitters::build(scene);
+        let mut sum = 0f64;
+        let k = 50_000;
+        for u in points(k) {
+            let Some(s) = emitters.sample(scene, p, n, [u[0], u[1], u[2]]) else { continue };
+            if !s.delta && s.distance.is_finite() {
+                let EmitterKind::Polygon(shape) = &emitters.lights()[s.light as usize] else {
+                    panic!("even")
+                };
+                let density = emitters.pdf_triangle(p, n, shape.triangles[0], p + s.wi * s.distance);
+                assert!((density / s.pdf - 1.0).abs() < 1e-3);
+            }
+            if s.distance.is_infinite() && !s.delta {
+                assert!((emitters.pdf_sky(n, s.wi) / s.pdf - 1.0).abs() < 1e-3);
+            }
+            sum += (s.radiance.g * s.wi.dot(n).max(0.0) / s.pdf) as f64;
+        }
+        (sum / k as f64) as f32
+    }
+
+    #[test]
+    fn a_disc_lamp_gives_the_closed_form() {
+        // E = π L R² / (R² + h²); a 64-gon is smaller than its circle by 0.16 %.
+        let (r, h) = (1.0f32, 2.0f32);
+        let scene = scene_of(disc(64, r, h), 1.0);
+        let e = irradiance(&scene, Vec3::ZERO, Vec3::Y);
+        let exact = PI * r * r / (r * r + h * h);
+        assert!((e / exact - 1.0).abs() < 4e-3, "{e} {exact}");
+    }
+
+    #[test]
+    fn a_mix_of_all_kinds_adds_up() {
+        let mut scene = scene_of(quad(), 5.0);
+        scene.sky = Some(Sky::Constant(Rgb::splat(0.5)));
+        let lamp = |kind| Light { name: String::new(), intensity: Rgb::splat(3.0), kind };
+        scene.lights = vec![
+            lamp(LightKind::Directional { direction: Vec3::NEG_Y }),
+            lamp(LightKind::Point { position: Vec3::new(0.0, 2.0, 0.0), range: f32::INFINITY }),
+        ];
+        let corners: Vec<Vec3> = scene.mesh.positions.clone();
+        let exact = 0.5 * PI + 3.0 + 3.0 / 4.0 + 5.0 * PI * polygon_irradiance(Vec3::ZERO, Vec3::Y, &corners);
+        let e = irradiance(&scene, Vec3::ZERO, Vec3::Y);
+        assert!((e / exact - 1.0).abs() < 0.01, "{e} {exact}");
+    }
+
+    #[test]
+    fn a_hundred_lamps_add_up() {
+        let mut mesh = Mesh::default();
+        let mut exact = 0.0;
+        for i in 0..100 {
+            let at = Vec3::new((i % 10) as f32 - 4.5, 1.0, (i / 10) as f32 - 4.5);
+            let corners = append_quad(&mut mesh, at, 0.1);
+            exact += PI * polygon_irradiance(Vec3::ZERO, Vec3::Y, &corners);
+        }
+        let scene = scene_of(mesh, 1.0);
+        assert_eq!(Emitters::build(&scene).len(), 100);
+        let e = irradiance(&scene, Vec3::ZERO, Vec3::Y);
+        assert!((e / exact - 1.0).abs() < 0.02, "{e} {exact}");
+    }
+
+    #[test]
+    fn the_sky_alone_gives_pi_l() {
+        let scene = Scene { sky: Some(Sky::Constant(Rgb::splat(2.0))), ..Scene::default() };
+        assert!((irradiance(&scene, Vec3::ZERO, Vec3::Y) / (2.0 * PI) - 1.0).abs() < 1e-4);
+        assert!(Emitters::build(&Scene::default()).is_empty());
+    }
+}

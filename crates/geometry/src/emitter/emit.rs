@@ -1,0 +1,305 @@
+//! Light's own rays: photons that leave the lights, at random or toward what bends them.
+
+use super::area::PolygonLight;
+use super::{EmitterKind, Emitters, emission_at, hit_at, range_window, spot_falloff};
+use crate::math::{Vec3, frame, offset_origin, to_world};
+use crate::scene::{Light, LightKind};
+use crate::{Ray, Rgb, Scene};
+use std::f32::consts::{FRAC_1_PI, PI, TAU};
+
+/// A ray that leaves a light.
+#[derive(Clone, Copy, Debug)]
+pub struct Emission {
+    /// From the light, or from outside the scene for sky and directional lights.
+    pub ray: Ray,
+    /// What it carries, lm: the light's flux along it over the density of drawing it.
+    pub flux: Rgb,
+    /// Index into [`Emitters::lights`].
+    pub light: u32,
+    /// How far the lamp reaches, m; infinite but for lamps with a range.
+    pub range: f32,
+}
+
+impl Emission {
+    /// Share of the flux that counts after `distance` m from the lamp, 1 but for lamps with a range.
+    pub fn window(&self, distance: f32) -> f32 {
+        range_window(distance, self.range)
+    }
+}
+
+/// Half of the guided rays are drawn as if unguided, so that no light goes missing and no weight exceeds two.
+const UNGUIDED: f32 = 0.5;
+
+/// One draw in the making.
+struct Start<'a> {
+    emitters: &'a Emitters,
+    targets: &'a [(Vec3, f32)],
+    /// Chooses guided or not, and the target.
+    u: f32,
+    /// Of the light.
+    probability: f32,
+}
+
+impl Emitters {
+    /// A ray of light drawn in proportion to power; its flux averaged over draws is the flux of all lights.
+    ///
+    /// `u` in [0, 1)⁵: light, point or disc, direction. `None` where the draw carries nothing.
+    pub fn emit(&self, scene: &Scene, u: [f32; 5]) -> Option<Emission> {
+        self.emit_toward(scene, &[], [u[0], u[1], u[2], u[3], u[4], 0.0])
+    }
+
+    /// As [`Emitters::emit`], but half of the rays head for `targets`: bounding spheres (centre, radius in m > 0) of
+    /// what the caller wants to hit.
+    ///
+    /// Unbiased for light that misses them too: a mixture of both ways of drawing, weighed by the density of the
+    /// mixture (Veach's balance heuristic for one sample; Veach and Guibas, SIGGRAPH 1995).
+    pub fn emit_toward(&self, scene: &Scene, targets: &[(Vec3, f32)], u: [f32; 6]) -> Option<Emission> {
+        let light = self.power_sums.partition_point(|&s| s <= u[0]).clamp(1, self.lights.len().max(1)) - 1;
+        let kind = self.lights.get(light)?;
+        let probability = self.power_sums[light + 1] - self.power_sums[light];
+        let start = Start { emitters: self, targets, u: u[5], probability };
+        let (a, b) = ([u[1], u[2]], [u[3], u[4]]);
+        let mut range = f32::INFINITY;
+        let (ray, flux) = match kind {
+            EmitterKind::Polygon(shape) => start.leave_polygon(shape, a, b, |_| shape.radiance)?,
+            EmitterKind::Textured(shape) => start.leave_polygon(shape, a, b, |(point, d)| {
+                emission_at(scene, &hit_at(scene, shape.triangles[0], point, 0.0), d.dot(shape.normal) > 0.0)
+            })?,
+            EmitterKind::Punctual(Light { intensity, kind, .. }) => match *kind {
+                LightKind::Directional { direction } => start.come_from_afar(direction, a, *intensity)?,
+                LightKind::Point { position, range: r } => {
+                    range = r;
+                    start.leave_lamp(position, Vec3::Y, -1.0, b, |_| *intensity)?
+                }
+                LightKind::Spot { position, direction, cos_inner, cos_outer, range: r } => {
+                    range = r;
+                    let intensity = |cos| *intensity * spot_falloff(cos, cos_inner, cos_outer);
+                    start.leave_lamp(position, direction, cos_outer, b, intensity)?
+                }
+            },
+            EmitterKind::Sky(sky) => {
+                let s = sky.sample(b);
+                start.come_from_afar(-s.direction, a, s.radiance / s.pdf)?
+            }
+        };
+        let usable = flux.is_finite() && flux.max_channel() > 0.0;
+        usable.then_some(Emission { ray, flux, light: light as u32, range })
+    }
+}
+
+impl Start<'_> {
+    /// From a surface: even in area, cosine or guided in direction.
+    fn leave_polygon(
+        &self,
+        shape: &PolygonLight,
+        a: [f32; 2],
+        b: [f32; 2],
+        radiance: impl Fn((Vec3, Vec3)) -> Rgb,
+    ) -> Option<(Ray, Rgb)> {
+        let point = shape.point(a);
+        let sides = if shape.two_sided { 2.0 } else { 1.0 };
+        let plain = |d: Vec3| {
+            let cos = d.dot(shape.normal);
+            (if shape.two_sided { cos.abs() } else { cos.max(0.0) }) * FRAC_1_PI / sides
+        };
+        let (d, ratio) = self.direction(point, b, || shape.direction(b), plain)?;
+        let cos = d.dot(shape.normal);
+        let flux = radiance((point, d)) * (PI * shape.area * sides * ratio / self.probability);
+        let ray = Ray::new(offset_origin(point, shape.normal * cos.signum()), d);
+        Some((ray, flux))
+    }
+
+    /// From a point, within the cone of cosine `cos_outer` around `axis`, its intensity (cd) by the cosine.
+    fn leave_lamp(
+        &self,
+        position: Vec3,
+        axis: Vec3,
+        cos_outer: f32,
+        b: [f32; 2],
+        intensity: impl Fn(f32) -> Rgb,
+    ) -> Option<(Ray, Rgb)> {
+        let solid_angle = TAU * (1.0 - cos_outer);
+        let plain = |d: Vec3| if d.dot(axis) >= cos_outer - 1e-6 { 1.0 / solid_angle } else { 0.0 };
+        let (d, ratio) = self.direction(position, b, || cone(axis, cos_outer, b), plain)?;
+        Some((Ray::new(position, d), intensity(d.dot(axis)) * (solid_angle * ratio / self.probability)))
+    }
+
+    /// Along `d` from a disc outside the scene, with the irradiance (lx) across it.
+    fn come_from_afar(&self, d: Vec3, a: [f32; 2], irradiance: Rgb) -> Option<(Ray, Rgb)> {
+        let Emitters { centre, radius, .. } = *self.emitters;
+        if radius <= 0.0 {
+            return None;
+        }
+        let (s, t) = frame(d);
+        let on_disc = |centre: Vec3, radius: f32| {
+            let (sin, cos) = (TAU * a[1]).sin_cos();
+            centre + (s * cos + t * sin) * (radius * a[0].sqrt())
+        };
+        let within =
+            |x: Vec3, (c, r): (Vec3, f32)| (x - c).reject_from_normalized(d).length_squared() <= r * r;
+        let disc = PI * radius * radius;
+        // A hair wider than the draw, lest rounding puts its rim outside.
+        let plain = |x: Vec3| if within(x, (centre, radius * 1.0001)) { 1.0 / disc } else { 0.0 };
+        let total: f32 = self.targets.iter().map(|t| PI * t.1 * t.1).sum();
+        let (x, ratio) = if self.targets.is_empty() {
+            (on_disc(centre, radius), 1.0)
+        } else {
+            let (c, r) = self.guided(|t| PI * t.1 * t.1, total).unwrap_or((centre, radius));
+            let x = on_disc(c, r);
+            let over = self.targets.iter().filter(|t| within(x, **t)).count();
+            (x, plain(x) / (UNGUIDED * plain(x) + (1.0 - UNGUIDED) * over as f32 / total))
+        };
+        // To a plane in front of the whole scene.
+        let back = (x - centre).dot(d) + 1.01 * radius;
+        (ratio > 0.0).then(|| (Ray::new(x - d * back, d), irradiance * (disc * ratio / self.probability)))
+    }
+
+    /// A direction from `from`, and its plain density over that of the mixture.
+    fn direction(
+        &self,
+        from: Vec3,
+        b: [f32; 2],
+        unguided: impl Fn() -> Vec3,
+        plain: impl Fn(Vec3) -> f32,
+    ) -> Option<(Vec3, f32)> {
+        if self.targets.is_empty() {
+            return Some((unguided(), 1.0));
+        }
+        let total: f32 = self.targets.iter().map(|t| Cone::around(from, *t).solid_angle).sum();
+        let d = match self.guided(|t| Cone::around(from, t).solid_angle, total) {
+            None => unguided(),
+            Some(target) => Cone::around(from, target).sample(b),
+        };
+        let over = self.targets.iter().filter(|t| Cone::around(from, **t).contains(d)).count();
+        let ratio = plain(d) / (UNGUIDED * plain(d) + (1.0 - UNGUIDED) * over as f32 / total);
+        (ratio > 0.0 && ratio.is_finite()).then_some((d, ratio))
+    }
+
+    /// `None` for an unguided draw, else a target in proportion to `weight`, which sums to `total`.
+    fn guided(&self, weight: impl Fn((Vec3, f32)) -> f32, total: f32) -> Option<(Vec3, f32)> {
+        if self.u < UNGUIDED {
+            return None;
+        }
+        let mut left = (self.u - UNGUIDED) / (1.0 - UNGUIDED) * total;
+        for &t in self.targets {
+            left -= weight(t);
+            if left < 0.0 {
+                return Some(t);
+            }
+        }
+        self.targets.last().copied()
+    }
+}
+
+/// The directions in which a sphere is seen from a point.
+struct Cone {
+    axis: Vec3,
+    cos: f32,
+    sin2: f32,
+    solid_angle: f32,
+}
+
+impl Cone {
+    /// From `from`; all directions from within the sphere.
+    fn around(from: Vec3, (centre, radius): (Vec3, f32)) -> Cone {
+        let way = centre - from;
+        let d2 = way.length_squared();
+        let sin2 = radius * radius / d2;
+        if d2 <= radius * radius || sin2 >= 1.0 {
+            return Cone { axis: Vec3::Y, cos: -1.0, sin2: f32::INFINITY, solid_angle: 2.0 * TAU };
+        }
+        let cos = (1.0 - sin2).sqrt();
+        // 1 − cos without cancellation for small targets.
+        Cone { axis: way / d2.sqrt(), cos, sin2, solid_angle: TAU * sin2 / (1.0 + cos) }
+    }
+
+    /// By the sine, whose square still has digits where the cosine of a narrow cone has rounded to one.
+    fn contains(&self, d: Vec3) -> bool {
+        self.sin2.is_infinite()
+            || (d.dot(self.axis) > 0.0 && d.cross(self.axis).length_squared() <= self.sin2)
+    }
+
+    /// A unit direction, even in solid angle.
+    fn sample(&self, u: [f32; 2]) -> Vec3 {
+        let narrow = if self.sin2.is_infinite() { 2.0 } else { self.sin2 / (1.0 + self.cos) };
+        let down = u[0] * narrow;
+        let r = (down * (2.0 - down)).max(0.0).sqrt();
+        let (sin, cos) = (TAU * u[1]).sin_cos();
+        to_world(Vec3::new(r * cos, r * sin, 1.0 - down), self.axis)
+    }
+}
+
+/// As [`Cone::sample`], in the cone of cosine `cos` around `axis`.
+fn cone(axis: Vec3, cos: f32, u: [f32; 2]) -> Vec3 {
+    let sin2 = if cos <= -1.0 { f32::INFINITY } else { (1.0 - cos) * (1.0 + cos) };
+    Cone { axis, cos, sin2, solid_angle: TAU * (1.0 - cos) }.sample(u)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Sky;
+    use crate::emitter::testing::{points, quad, scene_of};
+
+    /// Everything that shines, and one draw for each point of a low-discrepancy sequence.
+    fn scene() -> Scene {
+        let mut scene = scene_of(quad(), 5.0);
+        scene.materials[0].double_sided = true;
+        scene.sky = Some(Sky::Constant(Rgb::splat(0.3)));
+        let (position, direction, range) = (Vec3::new(1.0, 3.0, 0.0), Vec3::NEG_Y, f32::INFINITY);
+        scene.lights = [
+            LightKind::Directional { direction: Vec3::new(0.6, -0.8, 0.0) },
+            LightKind::Point { position, range },
+            LightKind::Spot { position, direction, cos_inner: 0.9, cos_outer: 0.7, range },
+        ]
+        .map(|kind| Light { name: String::new(), intensity: Rgb::splat(2.0), kind })
+        .to_vec();
+        scene
+    }
+
+    /// Flux of all, and of what passes through a small sphere, plain and guided.
+    #[test]
+    fn guided_or_not_the_same_flux() {
+        let scene = scene();
+        let emitters = Emitters::build(&scene);
+        let whole: f32 = emitters.power().iter().map(|p| p.g).sum();
+        let ball = (Vec3::new(0.4, 1.2, -0.3), 0.12f32);
+        let targets = [ball, (Vec3::new(0.2, 1.45, 0.1), 0.2)];
+        let n = 400_000;
+        let tally = |targets: &[(Vec3, f32)]| {
+            let (mut all, mut near) = (0f64, 0f64);
+            for e in points(n).filter_map(|u| emitters.emit_toward(&scene, targets, u)) {
+                assert!((e.ray.direction.length() - 1.0).abs() < 1e-4);
+                let way = ball.0 - e.ray.origin;
+                let flux = (e.flux.g / n as f32) as f64;
+                all += flux;
+                let close = way.reject_from_normalized(e.ray.direction).length() < ball.1;
+                near += if close && way.dot(e.ray.direction) > 0.0 { flux } else { 0.0 };
+            }
+            (all as f32, near as f32)
+        };
+        let (plain, guided) = (tally(&[]), tally(&targets));
+        assert!((plain.0 / whole - 1.0).abs() < 2e-3, "{plain:?} {whole}");
+        assert!((guided.0 / whole - 1.0).abs() < 1e-2, "{guided:?} {whole}");
+        assert!((plain.1 / guided.1 - 1.0).abs() < 4e-2, "{plain:?} {guided:?}");
+    }
+
+    #[test]
+    fn each_light_gives_its_power() {
+        let scene = scene();
+        let emitters = Emitters::build(&scene);
+        let n = 200_000;
+        let mut sums = vec![0f64; emitters.len()];
+        points(n).filter_map(|u| emitters.emit(&scene, [u[0], u[1], u[2], u[3], u[4]])).for_each(|e| {
+            sums[e.light as usize] += (e.flux.g / n as f32) as f64;
+        });
+        for (sum, power) in sums.iter().zip(emitters.power()) {
+            assert!((*sum as f32 / power.g - 1.0).abs() < 2e-2, "{sum} {power:?}");
+        }
+    }
+
+    #[test]
+    fn nothing_shines_nothing_leaves() {
+        assert!(Emitters::build(&Scene::default()).emit(&Scene::default(), [0.5; 5]).is_none());
+    }
+}

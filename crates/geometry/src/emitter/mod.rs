@@ -1,0 +1,185 @@
+//! Lamps, emissive triangles and sky as things one samples: choose a light, sample it, and the pdf of both.
+
+mod area;
+mod build;
+mod choice;
+mod emit;
+mod merge;
+mod punctual;
+mod spherical;
+#[cfg(test)]
+mod testing;
+mod tree;
+
+pub use area::PolygonLight;
+pub use emit::Emission;
+pub use merge::MAX_CORNERS;
+pub use punctual::{range_window, spot_falloff};
+
+use crate::math::{Vec3, offset_origin};
+use crate::scene::Light;
+use crate::{Hit, Ray, Rgb, Scene, Sky};
+use std::f32::consts::PI;
+use tree::LightTree;
+
+/// All that shines in a scene. Unlit materials show but do not shine.
+#[derive(Clone, Debug, Default)]
+pub struct Emitters {
+    lights: Vec<EmitterKind>,
+    /// Light of each triangle of the mesh, [`NO_LIGHT`] for none; empty when no triangle shines.
+    of_triangle: Vec<u32>,
+    /// Over `lights[..tree_lights]`: what has a place.
+    tree: LightTree,
+    tree_lights: u32,
+    /// Probability with which the tree is asked.
+    tree_share: f32,
+    /// Lights from infinitely far, and the probability of each.
+    far: Vec<(u32, f32)>,
+    /// Of each light, lm.
+    power: Vec<Rgb>,
+    /// Running sums of the power's share, one more than lights.
+    power_sums: Vec<f32>,
+    /// Middle of the scene's bounding sphere.
+    centre: Vec3,
+    /// Its radius, m.
+    radius: f32,
+}
+
+const NO_LIGHT: u32 = u32::MAX;
+
+/// One light.
+#[derive(Clone, Debug)]
+pub enum EmitterKind {
+    /// Emissive triangles of one radiance, joined to a convex polygon.
+    Polygon(PolygonLight),
+    /// A triangle whose emission a texture, a vertex colour or alpha varies; its radiance is the mean.
+    Textured(PolygonLight),
+    /// A lamp of KHR_lights_punctual: point, spot or directional.
+    Punctual(Light),
+    /// Light from beyond all triangles.
+    Sky(Sky),
+}
+
+/// One way from a point to a light.
+#[derive(Clone, Copy, Debug)]
+pub struct LightSample {
+    /// Unit, toward the light.
+    pub wi: Vec3,
+    /// How far, m; infinite for sky and directional lights.
+    pub distance: f32,
+    /// Radiance, cd/m²; for a delta light the irradiance on a surface that faces it, lx.
+    pub radiance: Rgb,
+    /// Density over solid angle, 1/sr, choice of the light included; for a delta light the probability of the choice.
+    pub pdf: f32,
+    /// Whether the light has no extent, so that no other way of sampling can find it.
+    pub delta: bool,
+    /// Index into [`Emitters::lights`].
+    pub light: u32,
+}
+
+impl LightSample {
+    /// From `p`, on a surface of unit geometric normal `ng` (zero in mid-air), to just before the light.
+    pub fn shadow_ray(&self, p: Vec3, ng: Vec3) -> Ray {
+        let side = if self.wi.dot(ng) < 0.0 { -ng } else { ng };
+        let origin = if ng == Vec3::ZERO { p } else { offset_origin(p, side) };
+        // Short of the light by more than rounding, and than the offset of the origin.
+        Ray { origin, direction: self.wi, t_min: 0.0, t_max: self.distance * (1.0 - 1e-4) }
+    }
+}
+
+impl Emitters {
+    /// Whether nothing shines.
+    pub fn is_empty(&self) -> bool {
+        self.lights.is_empty()
+    }
+
+    /// Number of lights.
+    pub fn len(&self) -> usize {
+        self.lights.len()
+    }
+
+    /// All lights, so that a caller may treat few of them one by one.
+    pub fn lights(&self) -> &[EmitterKind] {
+        &self.lights
+    }
+
+    /// The light that a triangle of the mesh belongs to.
+    pub fn light_of_triangle(&self, triangle: u32) -> Option<u32> {
+        self.of_triangle.get(triangle as usize).copied().filter(|&l| l != NO_LIGHT)
+    }
+
+    /// Light that leaves each light, lm; for sky and directional lights what enters the scene's bounding sphere.
+    pub fn power(&self) -> &[Rgb] {
+        &self.power
+    }
+
+    /// A way from `p` to one given light, the pdf without the probability of choosing that light; `u` in [0, 1)².
+    /// `None` where it sends no light.
+    pub fn sample_light(&self, scene: &Scene, light: u32, p: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        match self.lights.get(light as usize)? {
+            EmitterKind::Polygon(shape) => {
+                let (point, pdf) = shape.sample(p, u)?;
+                let way = point - p;
+                let distance = way.length();
+                let wi = way / distance;
+                Some(LightSample { wi, distance, radiance: shape.radiance, pdf, delta: false, light })
+            }
+            EmitterKind::Textured(shape) => {
+                let (point, pdf) = shape.sample(p, u)?;
+                let way = point - p;
+                let distance = way.length();
+                let wi = way / distance;
+                let hit = hit_at(scene, shape.triangles[0], point, distance);
+                let radiance = emission_at(scene, &hit, wi.dot(shape.normal) < 0.0);
+                Some(LightSample { wi, distance, radiance, pdf, delta: false, light })
+            }
+            EmitterKind::Punctual(lamp) => {
+                let (wi, distance, radiance) = lamp.reaching(p)?;
+                Some(LightSample { wi, distance, radiance, pdf: 1.0, delta: true, light })
+            }
+            EmitterKind::Sky(sky) => {
+                let s = sky.sample(u);
+                let usable = s.pdf > 0.0 && s.pdf.is_finite();
+                usable.then_some(LightSample {
+                    wi: s.direction,
+                    distance: f32::INFINITY,
+                    radiance: s.radiance,
+                    pdf: s.pdf,
+                    delta: false,
+                    light,
+                })
+            }
+        }
+    }
+
+    /// Irradiance (mean of the channels, lx) that one light throws on `p` with unit normal `n` if nothing stood
+    /// between: exact for polygons and lamps, the sky's mean for a sky. With a zero `n` the surface faces the light.
+    pub fn importance(&self, light: u32, p: Vec3, n: Vec3) -> f32 {
+        let cos = |wi: Vec3| if n == Vec3::ZERO { 1.0 } else { wi.dot(n).max(0.0) };
+        match self.lights.get(light as usize) {
+            Some(EmitterKind::Polygon(shape) | EmitterKind::Textured(shape)) => shape.irradiance(p, n).mean(),
+            Some(EmitterKind::Punctual(lamp)) => {
+                lamp.reaching(p).map_or(0.0, |(wi, _, e)| e.mean() * cos(wi))
+            }
+            Some(EmitterKind::Sky(sky)) => PI * sky.mean().mean(),
+            None => 0.0,
+        }
+    }
+}
+
+/// The point of a triangle as a ray of length `t` would have found it.
+fn hit_at(scene: &Scene, triangle: u32, point: Vec3, t: f32) -> Hit {
+    let [a, b, c] = scene.mesh.corners(triangle).map(|v| v.as_dvec3());
+    let p = point.as_dvec3() - a;
+    let (e, f) = (b - a, c - a);
+    let n = e.cross(f);
+    let (u, v) = (p.cross(f).dot(n) / n.length_squared(), e.cross(p).dot(n) / n.length_squared());
+    let u = u.clamp(0.0, 1.0);
+    Hit { t, triangle, u: u as f32, v: v.clamp(0.0, 1.0 - u) as f32 }
+}
+
+/// Emission of the material alone, until the shading model's own `emission_at` knows textures.
+fn emission_at(scene: &Scene, hit: &Hit, front: bool) -> Rgb {
+    let material = &scene.materials[scene.mesh.materials[hit.triangle as usize].0 as usize];
+    if front || material.double_sided { material.emissive } else { Rgb::BLACK }
+}

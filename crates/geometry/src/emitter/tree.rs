@@ -1,0 +1,299 @@
+//! A tree over lights of finite place, so that choosing one of thousands costs a walk from root to leaf.
+//!
+//! Conty Estevez and Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", HPG 2018: each node
+//! bounds its lights' places (box), directions (cone) and strength; a walk takes the child that promises more light.
+
+use crate::math::Vec3;
+use std::f32::consts::{FRAC_PI_2, PI};
+
+/// What one light, or a node full of lights, is bounded by.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LightBounds {
+    pub lo: Vec3,
+    pub hi: Vec3,
+    /// Middle of the directions in which the lights face.
+    pub axis: Vec3,
+    /// How far their facing strays from the axis, radians, [0, π].
+    pub spread: f32,
+    /// How far from its facing a light still shines, radians, (0, π/2].
+    pub reach: f32,
+    /// Whether a light shines behind itself too.
+    pub two_sided: bool,
+    /// Greatest intensity, cd.
+    pub intensity: f32,
+}
+
+impl LightBounds {
+    fn union(&self, o: &LightBounds) -> LightBounds {
+        let (axis, spread) = cone_union((self.axis, self.spread), (o.axis, o.spread));
+        LightBounds {
+            lo: self.lo.min(o.lo),
+            hi: self.hi.max(o.hi),
+            axis,
+            spread,
+            reach: self.reach.max(o.reach),
+            two_sided: self.two_sided || o.two_sided,
+            intensity: self.intensity + o.intensity,
+        }
+    }
+
+    /// About the irradiance (lx) that the lights throw at most on `p` with unit normal `n`; no normal when zero.
+    /// Zero only where none of them can throw any.
+    fn importance(&self, p: Vec3, n: Vec3) -> f32 {
+        let centre = 0.5 * (self.lo + self.hi);
+        let way = centre - p;
+        let radius = 0.5 * (self.hi - self.lo).length();
+        let d = way.length();
+        if d <= radius * (1.0 + 1e-4) || d == 0.0 {
+            // Among the lights every direction is possible; the radius stands in for the distance.
+            return self.intensity / (radius * radius).max(f32::MIN_POSITIVE);
+        }
+        let toward = way / d;
+        let seen = (radius / d).min(1.0).asin();
+        // The margin keeps rounding from putting out a light at grazing angles.
+        let angle = |cos: f32, slack: f32| (cos.clamp(-1.0, 1.0).acos() - slack - 1e-3).max(0.0);
+        let mut facing = -toward.dot(self.axis);
+        if self.two_sided {
+            facing = facing.abs();
+        }
+        let emitted = angle(facing, self.spread + seen);
+        if emitted >= self.reach {
+            return 0.0;
+        }
+        let received = if n == Vec3::ZERO { 0.0 } else { angle(toward.dot(n), seen) };
+        if received >= FRAC_PI_2 {
+            return 0.0;
+        }
+        self.intensity * emitted.cos().max(1e-3) * received.cos() / (d * d).max(f32::MIN_POSITIVE)
+    }
+
+    /// Surface area times orientation measure times strength: what a node costs (eq. 1 and 2 of the paper).
+    fn cost(&self) -> f32 {
+        let d = self.hi - self.lo;
+        let area = 2.0 * (d.x * d.y + d.y * d.z + d.z * d.x) + 1e-3 * d.length_squared();
+        let (o, w) = (self.spread, (self.spread + self.reach).min(PI));
+        let measure = 2.0 * PI * (1.0 - o.cos())
+            + FRAC_PI_2 * (2.0 * w * o.sin() - (o - 2.0 * w).cos() - 2.0 * o * o.sin() + o.cos());
+        self.intensity * area * measure
+    }
+}
+
+/// The smallest cone around two, by the great circle through both axes.
+fn cone_union(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
+    let (a, b) = if a.1 >= b.1 { (a, b) } else { (b, a) };
+    let between = a.0.dot(b.0).clamp(-1.0, 1.0).acos();
+    if (between + b.1).min(PI) <= a.1 {
+        return a;
+    }
+    let spread = 0.5 * (a.1 + b.1 + between);
+    let turn = spread - a.1;
+    let sin = between.sin();
+    if spread >= PI || sin < 1e-4 {
+        // Nearly one axis, or opposite ones: a little or wholly too wide, never too narrow.
+        return if a.0.dot(b.0) > 0.0 { (a.0, (a.1.max(b.1) + between).min(PI)) } else { (a.0, PI) };
+    }
+    let axis = (a.0 * (between - turn).sin() + b.0 * turn.sin()) / sin;
+    (axis.normalize_or(a.0), spread)
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    bounds: LightBounds,
+    /// Its own parent at the root.
+    parent: u32,
+    /// The first of two children side by side, or the light of a leaf.
+    child_or_light: u32,
+    leaf: bool,
+}
+
+/// See the module.
+#[derive(Clone, Debug, Default)]
+pub(super) struct LightTree {
+    nodes: Vec<Node>,
+    /// Node of each light's leaf.
+    leaves: Vec<u32>,
+}
+
+impl LightTree {
+    /// A tree over lights numbered from 0 in the order of `bounds`.
+    pub fn build(bounds: &[LightBounds]) -> LightTree {
+        let mut tree =
+            LightTree { nodes: Vec::with_capacity(2 * bounds.len()), leaves: vec![0; bounds.len()] };
+        if bounds.is_empty() {
+            return tree;
+        }
+        let mut lights: Vec<u32> = (0..bounds.len() as u32).collect();
+        tree.nodes.push(tree.leaf(bounds, 0, 0));
+        let mut todo = vec![(0u32, 0usize, lights.len())];
+        while let Some((node, from, to)) = todo.pop() {
+            let all = union_of(bounds, &lights[from..to]);
+            if to - from == 1 {
+                let light = lights[from];
+                let parent = tree.parent(node);
+                tree.nodes[node as usize] = tree.leaf(bounds, light, parent);
+                tree.leaves[light as usize] = node;
+                continue;
+            }
+            let middle = from + split(bounds, &mut lights[from..to]);
+            let child = tree.nodes.len() as u32;
+            let parent = tree.parent(node);
+            tree.nodes[node as usize] = Node { bounds: all, parent, child_or_light: child, leaf: false };
+            for (k, (from, to)) in [(from, middle), (middle, to)].into_iter().enumerate() {
+                tree.nodes.push(tree.leaf(bounds, lights[from], node));
+                todo.push((child + k as u32, from, to));
+            }
+        }
+        tree
+    }
+
+    fn parent(&self, node: u32) -> u32 {
+        self.nodes[node as usize].parent
+    }
+
+    fn leaf(&self, bounds: &[LightBounds], light: u32, parent: u32) -> Node {
+        Node { bounds: bounds[light as usize], parent, child_or_light: light, leaf: true }
+    }
+
+    /// A light for the point `p` with unit normal `n` (zero for none), and the probability of that choice.
+    /// `None` when no light can reach the point. `u` in [0, 1).
+    pub fn choose(&self, p: Vec3, n: Vec3, mut u: f32) -> Option<(u32, f32)> {
+        let mut node = self.nodes.first()?;
+        let mut probability = 1.0;
+        while !node.leaf {
+            let first = node.child_or_light as usize;
+            let share = self.share(first, p, n)?;
+            let (next, taken) = if u < share { (first, share) } else { (first + 1, 1.0 - share) };
+            u = if u < share { u / share } else { (u - share) / (1.0 - share) }.min(1.0 - f32::EPSILON);
+            probability *= taken;
+            node = &self.nodes[next];
+        }
+        (probability > 0.0).then_some((node.child_or_light, probability))
+    }
+
+    /// The probability with which [`LightTree::choose`] takes `light`.
+    pub fn probability(&self, light: u32, p: Vec3, n: Vec3) -> f32 {
+        let mut node = self.leaves[light as usize] as usize;
+        let mut probability = 1.0;
+        while node != 0 {
+            let parent = &self.nodes[self.nodes[node].parent as usize];
+            let first = parent.child_or_light as usize;
+            let Some(share) = self.share(first, p, n) else { return 0.0 };
+            probability *= if node == first { share } else { 1.0 - share };
+            node = self.nodes[node].parent as usize;
+        }
+        probability
+    }
+
+    /// The first child's share of the importance of two children side by side; `None` when both have none.
+    fn share(&self, first: usize, p: Vec3, n: Vec3) -> Option<f32> {
+        let [a, b] = [first, first + 1].map(|i| self.nodes[i].bounds.importance(p, n).min(f32::MAX / 4.0));
+        (a + b > 0.0).then(|| a / (a + b))
+    }
+}
+
+fn union_of(bounds: &[LightBounds], lights: &[u32]) -> LightBounds {
+    let first = bounds[lights[0] as usize];
+    lights[1..].iter().fold(first, |all, &l| all.union(&bounds[l as usize]))
+}
+
+/// Orders `lights` so that the first k and the rest make good children; returns k in 1..len.
+fn split(bounds: &[LightBounds], lights: &mut [u32]) -> usize {
+    const BUCKETS: usize = 12;
+    let centre = |l: u32| 0.5 * (bounds[l as usize].lo + bounds[l as usize].hi);
+    let (lo, hi) = lights
+        .iter()
+        .map(|&l| centre(l))
+        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), c| (lo.min(c), hi.max(c)));
+    let extent = hi - lo;
+    let bucket = |l: u32, axis: usize| {
+        let x = (centre(l)[axis] - lo[axis]) / extent[axis];
+        ((x * BUCKETS as f32) as usize).min(BUCKETS - 1)
+    };
+    let mut best: Option<(f32, usize, usize)> = None;
+    for axis in (0..3).filter(|&a| extent[a] > 0.0) {
+        let mut of_bucket: [Option<LightBounds>; BUCKETS] = [None; BUCKETS];
+        for &l in lights.iter() {
+            let b = &mut of_bucket[bucket(l, axis)];
+            *b = Some(b.map_or(bounds[l as usize], |b| b.union(&bounds[l as usize])));
+        }
+        let join = |part: &[Option<LightBounds>]| part.iter().flatten().copied().reduce(|a, b| a.union(&b));
+        for cut in 1..BUCKETS {
+            if let (Some(a), Some(b)) = (join(&of_bucket[..cut]), join(&of_bucket[cut..])) {
+                // Thin boxes cost more: the paper's K_r keeps splits off the short axes.
+                let cost = (a.cost() + b.cost()) * extent.max_element() / extent[axis];
+                if best.is_none_or(|(c, ..)| cost < c) {
+                    best = Some((cost, axis, cut));
+                }
+            }
+        }
+    }
+    let Some((_, axis, cut)) = best else { return lights.len() / 2 };
+    lights.sort_by_key(|&l| bucket(l, axis) >= cut);
+    lights.partition_point(|&l| bucket(l, axis) < cut)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lights(n: u32) -> Vec<LightBounds> {
+        (0..n)
+            .map(|i| {
+                let x = |k: u32| ((i * 7919 + k * 104_729) % 1000) as f32 / 1000.0;
+                let lo = Vec3::new(x(1), x(2), x(3)) * 10.0;
+                LightBounds {
+                    lo,
+                    hi: lo + Vec3::new(x(4), x(5), x(6)) * 0.3,
+                    axis: Vec3::new(x(7) - 0.5, x(8) - 0.5, x(9) - 0.51).normalize(),
+                    spread: 0.0,
+                    reach: FRAC_PI_2,
+                    two_sided: i % 3 == 0,
+                    intensity: 0.1 + x(10),
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn probabilities_sum_to_one_and_match_the_choice() {
+        let bounds = lights(300);
+        let tree = LightTree::build(&bounds);
+        for (p, n) in [(Vec3::ZERO, Vec3::ZERO), (Vec3::splat(5.0), Vec3::Y), (Vec3::X * 30.0, Vec3::NEG_X)] {
+            let sum: f32 = (0..300).map(|l| tree.probability(l, p, n)).sum();
+            assert!((sum - 1.0).abs() < 1e-4 || n != Vec3::ZERO && sum < 1.0, "{p}: {sum}");
+            for i in 0..200 {
+                if let Some((light, probability)) = tree.choose(p, n, (i as f32 + 0.5) / 200.0) {
+                    assert!((tree.probability(light, p, n) / probability - 1.0).abs() < 1e-4);
+                }
+            }
+        }
+    }
+
+    /// Whatever part of a light faces the point, and lies above its horizon, has a chance.
+    #[test]
+    fn no_light_that_contributes_is_put_out() {
+        let bounds = lights(200);
+        let tree = LightTree::build(&bounds);
+        for i in 0..500u32 {
+            let x = |k: u32| ((i * 6271 + k * 15_485_863) % 997) as f32 / 997.0;
+            let p = Vec3::new(x(1), x(2), x(3)) * 14.0 - 2.0;
+            let n = (Vec3::new(x(4), x(5), x(6)) - 0.5).normalize_or(Vec3::Y);
+            for (l, b) in bounds.iter().enumerate() {
+                let point = b.lo + (b.hi - b.lo) * Vec3::new(x(7), x(8), x(9));
+                let way = (point - p).normalize();
+                let cos = -way.dot(b.axis);
+                if way.dot(n) > 1e-3 && (cos > 1e-3 || b.two_sided && cos < -1e-3) {
+                    assert!(tree.probability(l as u32, p, n) > 0.0, "light {l} at {p}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn many_lights_at_one_place_build() {
+        let same = vec![lights(1)[0]; 5000];
+        let tree = LightTree::build(&same);
+        let sum: f32 = (0..5000).map(|l| tree.probability(l, Vec3::splat(20.0), Vec3::ZERO)).sum();
+        assert!((sum - 1.0).abs() < 1e-3);
+    }
+}
