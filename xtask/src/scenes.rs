@@ -6,8 +6,13 @@
 mod cornell;
 mod document;
 mod furnace;
+mod gallery;
 mod material;
+mod paint;
+mod round;
 mod shapes;
+mod two_rooms;
+mod wall;
 
 use anyhow::{Context, Result, ensure};
 use document::Document;
@@ -22,6 +27,8 @@ const SCENES: &[Entry] = &[
     ("cornell-specular.gltf", cornell::cornell_specular),
     ("furnace.gltf", furnace::furnace),
     ("furnace-mixed.gltf", furnace::furnace_mixed),
+    ("two-rooms.gltf", two_rooms::two_rooms),
+    ("gallery.glb", gallery::gallery),
 ];
 
 /// The bytes of the file `name`: binary if the name ends in `.glb`, else JSON with its buffer embedded.

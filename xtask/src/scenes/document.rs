@@ -63,8 +63,8 @@ impl Document {
             let uvs: Vec<_> = shape.uvs.iter().map(|v| v.as_vec2().to_array().to_vec()).collect();
             attributes["TEXCOORD_0"] = json!(self.floats("VEC2", &uvs, false));
         }
-        if !shape.tangents.is_empty() {
-            let tangents: Vec<_> = shape.tangents.iter().map(|v| v.as_vec4().to_array().to_vec()).collect();
+        if self.materials[material.0].get("normalTexture").is_some() {
+            let tangents: Vec<_> = shape.tangents().iter().map(|v| v.as_vec4().to_array().to_vec()).collect();
             attributes["TANGENT"] = json!(self.floats("VEC4", &tangents, false));
         }
         let indices = self.indices(&shape.triangles, shape.positions.len());

@@ -1,9 +1,9 @@
 //! Shapes that scenes are built of: triangles with normals, in f64, fronts outward.
 
-use glam::{DMat3, DVec2, DVec3, DVec4};
+use glam::{DMat3, DVec2, DVec3, DVec4, Vec3Swizzles};
 use std::collections::HashMap;
 
-/// Triangles with normals. Texture coordinates and tangents are empty or as many as the positions.
+/// Triangles with normals. Texture coordinates are empty or as many as the positions.
 #[derive(Clone, Default)]
 pub struct Shape {
     /// Corners, m.
@@ -12,8 +12,6 @@ pub struct Shape {
     pub normals: Vec<DVec3>,
     /// v runs down the image, as glTF has it.
     pub uvs: Vec<DVec2>,
-    /// Unit length; w is the sign of the bitangent.
-    pub tangents: Vec<DVec4>,
     /// Counter-clockwise as seen from the front.
     pub triangles: Vec<[u32; 3]>,
 }
@@ -32,10 +30,19 @@ impl Shape {
 
     /// A closed box from its lowest to its highest corner.
     pub fn cuboid(lo: DVec3, hi: DVec3) -> Shape {
-        let top =
-            [(lo.x, lo.z), (lo.x, hi.z), (hi.x, hi.z), (hi.x, lo.z)].map(|(x, z)| DVec3::new(x, hi.y, z));
-        let [a, b, c, d] = top.map(|p| p.with_y(lo.y));
-        Shape::prism(top, lo.y).with(&Shape::quad(d, c, b, a))
+        Shape::faces(lo, hi).iter().fold(Shape::default(), |all, face| all.with(face))
+    }
+
+    /// The faces of a box toward −x, +x, −y, +y, −z and +z.
+    pub fn faces(lo: DVec3, hi: DVec3) -> [Shape; 6] {
+        let corner = |i: usize| {
+            let pick = |bit: usize, lo: f64, hi: f64| if i >> bit & 1 == 1 { hi } else { lo };
+            DVec3::new(pick(0, lo.x, hi.x), pick(1, lo.y, hi.y), pick(2, lo.z, hi.z))
+        };
+        [[0, 4, 6, 2], [5, 1, 3, 7], [0, 1, 5, 4], [6, 7, 3, 2], [1, 0, 2, 3], [4, 5, 7, 6]].map(|face| {
+            let [a, b, c, d] = face.map(corner);
+            Shape::quad(a, b, c, d)
+        })
     }
 
     /// The top and the sides of a block: `top` counter-clockwise from above, sides down to the height `floor`.
@@ -82,13 +89,13 @@ impl Shape {
         }
     }
 
-    /// Both shapes as one.
+    /// Both shapes as one; either both have texture coordinates, or neither.
     pub fn with(mut self, other: &Shape) -> Shape {
+        debug_assert!(self.positions.is_empty() || self.uvs.is_empty() == other.uvs.is_empty());
         let first = self.positions.len() as u32;
         self.positions.extend(&other.positions);
         self.normals.extend(&other.normals);
         self.uvs.extend(&other.uvs);
-        self.tangents.extend(&other.tangents);
         self.triangles.extend(other.triangles.iter().map(|t| t.map(|i| first + i)));
         self
     }
@@ -100,13 +107,45 @@ impl Shape {
         self
     }
 
-    /// Turned about the y axis through the origin, counter-clockwise from above, then moved.
-    pub fn placed(mut self, degrees: f64, by: DVec3) -> Shape {
-        let turn = DMat3::from_rotation_y(degrees.to_radians());
-        self.positions.iter_mut().for_each(|p| *p = turn * *p + by);
-        self.normals.iter_mut().for_each(|n| *n = turn * *n);
-        self.tangents.iter_mut().for_each(|t| *t = (turn * t.truncate()).extend(t.w));
+    /// Turned about an axis through the origin, counter-clockwise as the axis points at us.
+    pub fn turned(mut self, axis: DVec3, degrees: f64) -> Shape {
+        let turn = DMat3::from_axis_angle(axis, degrees.to_radians());
+        self.positions.iter_mut().chain(&mut self.normals).for_each(|v| *v = turn * *v);
         self
+    }
+
+    /// Moved by a vector, m.
+    pub fn moved(mut self, by: DVec3) -> Shape {
+        self.positions.iter_mut().for_each(|p| *p += by);
+        self
+    }
+
+    /// With one image over each quadrilateral that [`Shape::quad`] made, upright: a is its lower left corner.
+    pub fn pictured(mut self) -> Shape {
+        let corners = [DVec2::new(0.0, 1.0), DVec2::ONE, DVec2::new(1.0, 0.0), DVec2::ZERO];
+        self.uvs = corners.repeat(self.positions.len() / 4);
+        self
+    }
+
+    /// With an image of `size` metres repeated over it, projected along the axis each normal is nearest to.
+    pub fn tiled(mut self, size: f64) -> Shape {
+        let project = |(p, n): (&DVec3, &DVec3)| {
+            let n = n.abs();
+            let uv = match n.max_element() {
+                m if m == n.y => p.xz(),
+                m if m == n.x => DVec2::new(p.z, -p.y),
+                _ => DVec2::new(p.x, -p.y),
+            };
+            uv / size
+        };
+        self.uvs = self.positions.iter().zip(&self.normals).map(project).collect();
+        self
+    }
+
+    /// The tangents that a normal map on [`Shape::pictured`] quadrilaterals needs: rightward, bitangent upward.
+    pub fn tangents(&self) -> Vec<DVec4> {
+        let right = |quad: &[DVec3]| (quad[1] - quad[0]).normalize().extend(1.0);
+        self.positions.chunks(4).flat_map(|quad| [right(quad); 4]).collect()
     }
 
     /// The signed volume that the triangles enclose, m³: positive when a closed shape faces outward.
