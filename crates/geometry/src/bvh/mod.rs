@@ -9,14 +9,18 @@
 
 mod binary;
 mod items;
+mod kernel;
 mod portable;
 mod prepared;
+#[cfg(target_arch = "x86_64")]
+mod simd;
 #[cfg(test)]
 mod tests;
 mod wide;
 
 use crate::Mesh;
 use crate::math::Vec3;
+pub use kernel::Kernel;
 use prepared::Prepared;
 use wide::Tree;
 
@@ -62,25 +66,50 @@ pub struct Hit {
 #[derive(Debug)]
 pub struct Bvh {
     tree: Tree,
+    kernel: Kernel,
 }
 
 impl Bvh {
     /// Builds the tree; triangles without area or with a corner that is not finite are left out.
     pub fn build(mesh: &Mesh) -> Bvh {
+        Bvh::build_for(mesh, Kernel::best())
+    }
+
+    /// Builds the tree, to be traversed by `kernel`, or in plain Rust where the machine has not that kernel.
+    pub fn build_for(mesh: &Mesh, kernel: Kernel) -> Bvh {
         let (items, order) = items::items(mesh);
-        let binary = binary::build(mesh, &items, order);
-        Bvh { tree: wide::fold(mesh, binary) }
+        let tree = wide::fold(mesh, binary::build(mesh, &items, order));
+        Bvh { tree, kernel: if kernel.is_available() { kernel } else { Kernel::Portable } }
     }
 
     /// The nearest triangle that the ray meets within (t_min, t_max), from either side.
     ///
     /// Of several at exactly the same `t` the one with the smallest index. A ray that is not finite meets nothing.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        portable::closest_hit(&self.tree, &Prepared::new(ray)?)
+        let ray = &Prepared::new(ray)?;
+        match self.kernel {
+            #[cfg(target_arch = "x86_64")]
+            #[allow(unsafe_code)]
+            // SAFETY: the kernel is available.
+            Kernel::Avx2 => unsafe { simd::closest_hit(&self.tree, ray) },
+            _ => portable::closest_hit(&self.tree, ray),
+        }
     }
 
     /// Whether the ray meets any triangle within (t_min, t_max).
     pub fn occluded(&self, ray: &Ray) -> bool {
-        Prepared::new(ray).is_some_and(|ray| portable::occluded(&self.tree, &ray))
+        let Some(ray) = &Prepared::new(ray) else { return false };
+        match self.kernel {
+            #[cfg(target_arch = "x86_64")]
+            #[allow(unsafe_code)]
+            // SAFETY: the kernel is available.
+            Kernel::Avx2 => unsafe { simd::occluded(&self.tree, ray) },
+            _ => portable::occluded(&self.tree, ray),
+        }
+    }
+
+    /// Memory that the tree takes, bytes.
+    pub fn bytes(&self) -> usize {
+        self.tree.bytes()
     }
 }

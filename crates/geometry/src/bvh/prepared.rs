@@ -46,7 +46,8 @@ impl Prepared {
             enters: inverse.map(|i| usize::from(i.is_sign_negative())),
             axes,
             shear: [d[axes[0]] * scale, d[axes[1]] * scale, scale],
-            t_min: ray.t_min,
+            // Never −0.0: the vector kernels sort t by its bits.
+            t_min: ray.t_min + 0.0,
             t_max: ray.t_max,
         })
     }

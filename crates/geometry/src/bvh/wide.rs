@@ -44,6 +44,13 @@ pub(super) struct Tree {
     pub blocks: Vec<Block>,
 }
 
+impl Tree {
+    /// Memory taken, bytes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.nodes[..]) + size_of_val(&self.blocks[..])
+    }
+}
+
 /// Folds a binary tree into a wide one: each node opens its child of largest area until it has eight.
 pub(super) fn fold(mesh: &Mesh, mut binary: Binary) -> Tree {
     let mut tree = Tree { nodes: vec![Node::empty()], blocks: Vec::with_capacity(binary.order.len() / 2) };

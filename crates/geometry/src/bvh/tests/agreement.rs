@@ -27,6 +27,7 @@ fn exact(mesh: &Mesh, t: u32, ray: &Ray) -> Option<(f64, f64)> {
 /// Traces rays from and toward the mesh's surroundings, and compares.
 fn check(mesh: &Mesh, rays: usize, seed: u64) {
     let bvh = Bvh::build(mesh);
+    let others: Vec<Bvh> = Kernel::ALL.into_iter().map(|k| Bvh::build_for(mesh, k)).collect();
     let (lo, hi) = mesh.bounds().unwrap();
     let (centre, size) = (0.5 * (lo + hi), 0.5 * (hi - lo).max_element());
     // t is worked out from corners relative to the origin, of magnitude up to a few sizes; so is what is left of the
@@ -44,6 +45,10 @@ fn check(mesh: &Mesh, rays: usize, seed: u64) {
         let hit = bvh.closest_hit(&ray);
         assert_eq!(hit, brute_force(&bvh, &ray), "{ray:?}");
         assert_eq!(bvh.occluded(&ray), hit.is_some(), "{ray:?}");
+        for other in &others {
+            assert_eq!(other.closest_hit(&ray), hit, "{ray:?} by {:?}", other.kernel);
+            assert_eq!(other.occluded(&ray), hit.is_some(), "{ray:?} by {:?}", other.kernel);
+        }
         if let Some(h) = hit {
             hits += 1;
             assert!(h.t > ray.t_min && h.t < ray.t_max);

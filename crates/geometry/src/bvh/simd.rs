@@ -1,0 +1,305 @@
+//! Traversal with AVX2: the eight boxes of a node at once, the four triangles of a block at once.
+//!
+//! The one place in this crate with `unsafe`. What it rests on:
+//!
+//! 1. *The instructions exist.* [`super::Kernel`] is `Avx2` only where the processor was asked and has it.
+//! 2. *References are in range.* Those of a [`Tree`] are written by `wide::fold` alone and never change: a reference is the
+//!    index of a node, or `BLOCK` plus the index of a block, that is in the tree.
+//! 3. *The stack suffices.* `wide::fold` bounds the depth of the tree, and [`STACK`] is made from that bound.
+//! 4. *Only what was pushed is popped*, so no entry is read before it is written.
+//! 5. *Rows are aligned*: nodes to 64 bytes with rows of 32, blocks to 16 with rows of 16.
+//!
+//! Operation by operation this is `portable`, in the same order and without fused multiply-add, hence bit for bit the
+//! same answer. In `max(a, b)` and `min(a, b)` the processor returns b when either is NaN: b is the interval so far.
+
+#![allow(unsafe_code)]
+
+use super::Hit;
+use super::prepared::Prepared;
+use super::wide::{BLOCK, Block, Node, STACK, Tree};
+use std::arch::x86_64::*;
+use std::mem::MaybeUninit;
+
+/// A ray, each number in all lanes.
+struct Lanes {
+    origin: [__m256; 3],
+    inverse_near: [__m256; 3],
+    inverse_far: [__m256; 3],
+    /// Offsets, in bytes from the node, of the rows the ray enters and leaves through.
+    entry: [usize; 3],
+    exit: [usize; 3],
+    t_min: __m256,
+    /// Of the triangle test, in the order of the ray's axes.
+    corner_origin: [__m128; 3],
+    shear: [__m128; 3],
+}
+
+/// References still to be looked at, and where the ray enters them: `t` in the upper half, whose bits sort as the number
+/// does since t ≥ 0, the reference in the lower.
+struct Stack {
+    entries: [MaybeUninit<u64>; STACK],
+    top: usize,
+}
+
+impl Stack {
+    #[inline(always)]
+    fn new() -> Stack {
+        Stack { entries: [const { MaybeUninit::uninit() }; STACK], top: 0 }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, entry: u64) {
+        debug_assert!(self.top < STACK);
+        // SAFETY: 3.
+        unsafe { self.entries.get_unchecked_mut(self.top) }.write(entry);
+        self.top += 1;
+    }
+
+    #[inline(always)]
+    fn pop(&mut self) -> Option<u64> {
+        self.top = self.top.checked_sub(1)?;
+        // SAFETY: 4.
+        Some(unsafe { self.entries.get_unchecked(self.top).assume_init() })
+    }
+
+    /// Sorts the entries from `first` on, the nearest on top.
+    #[inline(always)]
+    fn sort(&mut self, first: usize) {
+        for i in first + 1..self.top {
+            let mut j = i;
+            // SAFETY: 4; first ≤ j − 1 < j < top.
+            unsafe {
+                let entry = self.entries.get_unchecked(i).assume_init();
+                while j > first {
+                    let before = self.entries.get_unchecked(j - 1).assume_init();
+                    if before >= entry {
+                        break;
+                    }
+                    self.entries.get_unchecked_mut(j).write(before);
+                    j -= 1;
+                }
+                self.entries.get_unchecked_mut(j).write(entry);
+            }
+        }
+    }
+}
+
+/// The nearest hit.
+///
+/// # Safety
+/// The processor has AVX2.
+pub(super) unsafe fn closest_hit(tree: &Tree, ray: &Prepared) -> Option<Hit> {
+    // SAFETY: the caller's promise.
+    unsafe { closest_hit_avx2(tree, ray) }
+}
+
+/// Whether there is any hit.
+///
+/// # Safety
+/// The processor has AVX2.
+pub(super) unsafe fn occluded(tree: &Tree, ray: &Prepared) -> bool {
+    // SAFETY: the caller's promise.
+    unsafe { occluded_avx2(tree, ray) }
+}
+
+#[target_feature(enable = "avx2,bmi1")]
+fn closest_hit_avx2(tree: &Tree, ray: &Prepared) -> Option<Hit> {
+    let lanes = Lanes::new(ray);
+    let mut best = Hit { t: ray.t_max, triangle: 0, u: 0.0, v: 0.0 };
+    let mut found = false;
+    let mut far = _mm256_set1_ps(ray.t_max);
+    let mut stack = Stack::new();
+    let mut reference = 0u32;
+    loop {
+        // Down to a block, always into the nearest child.
+        while reference & BLOCK == 0 {
+            // SAFETY: 2.
+            let node = unsafe { tree.nodes.get_unchecked(reference as usize) };
+            let (near, mut mask) = lanes.enter(node, far);
+            if mask == 0 {
+                break;
+            }
+            let near = to_array(near);
+            let mut next = || {
+                let lane = mask.trailing_zeros() as usize & 7;
+                mask &= mask.wrapping_sub(1);
+                (mask, (near[lane].to_bits() as u64) << 32 | node.child[lane] as u64)
+            };
+            let (rest, a) = next();
+            if rest == 0 {
+                reference = a as u32;
+                continue;
+            }
+            let (rest, b) = next();
+            if rest == 0 {
+                stack.push(a.max(b));
+                reference = a.min(b) as u32;
+                continue;
+            }
+            let first = stack.top;
+            stack.push(a);
+            stack.push(b);
+            loop {
+                let (rest, c) = next();
+                stack.push(c);
+                if rest == 0 {
+                    break;
+                }
+            }
+            stack.sort(first);
+            reference = stack.pop().unwrap_or(0) as u32;
+        }
+        if reference & BLOCK != 0 {
+            // SAFETY: 2.
+            let block = unsafe { tree.blocks.get_unchecked((reference & !BLOCK) as usize) };
+            if lanes.meet(block, ray, &mut best, &mut found) {
+                far = _mm256_set1_ps(best.t);
+            }
+        }
+        // Up to the nearest that is not beyond the hit so far.
+        loop {
+            let Some(entry) = stack.pop() else { return found.then_some(best) };
+            if f32::from_bits((entry >> 32) as u32) <= best.t {
+                reference = entry as u32;
+                break;
+            }
+        }
+    }
+}
+
+#[target_feature(enable = "avx2,bmi1")]
+fn occluded_avx2(tree: &Tree, ray: &Prepared) -> bool {
+    let lanes = Lanes::new(ray);
+    let far = _mm256_set1_ps(ray.t_max);
+    let mut stack = Stack::new();
+    stack.push(0);
+    while let Some(entry) = stack.pop() {
+        let reference = entry as u32;
+        if reference & BLOCK != 0 {
+            // SAFETY: 2.
+            let block = unsafe { tree.blocks.get_unchecked((reference & !BLOCK) as usize) };
+            let (mut best, mut found) = (Hit { t: ray.t_max, triangle: 0, u: 0.0, v: 0.0 }, false);
+            if lanes.meet(block, ray, &mut best, &mut found) {
+                return true;
+            }
+            continue;
+        }
+        // SAFETY: 2.
+        let node = unsafe { tree.nodes.get_unchecked(reference as usize) };
+        let (_, mut mask) = lanes.enter(node, far);
+        while mask != 0 {
+            let lane = mask.trailing_zeros() as usize & 7;
+            mask &= mask.wrapping_sub(1);
+            stack.push(node.child[lane] as u64);
+        }
+    }
+    false
+}
+
+impl Lanes {
+    #[target_feature(enable = "avx2")]
+    #[inline]
+    fn new(ray: &Prepared) -> Lanes {
+        let row = |side: usize, axis: usize| 96 * side + 32 * axis;
+        let all = |x: [f32; 3]| [_mm256_set1_ps(x[0]), _mm256_set1_ps(x[1]), _mm256_set1_ps(x[2])];
+        let four = |x: [f32; 3]| [_mm_set1_ps(x[0]), _mm_set1_ps(x[1]), _mm_set1_ps(x[2])];
+        Lanes {
+            origin: all(ray.origin),
+            inverse_near: all(ray.inverse_near),
+            inverse_far: all(ray.inverse_far),
+            entry: [0, 1, 2].map(|axis| row(ray.enters[axis], axis)),
+            exit: [0, 1, 2].map(|axis| row(1 - ray.enters[axis], axis)),
+            t_min: _mm256_set1_ps(ray.t_min),
+            corner_origin: four(ray.axes.map(|k| ray.origin[k])),
+            shear: four(ray.shear),
+        }
+    }
+
+    /// Where the ray enters each child's box, and a bit for each child that it meets before `far`.
+    #[target_feature(enable = "avx2")]
+    #[inline]
+    fn enter(&self, node: &Node, far: __m256) -> (__m256, u32) {
+        let base = (node as *const Node).cast::<u8>();
+        // SAFETY: 5; the offsets are those of the six rows, all within the node.
+        let row = |offset: usize| unsafe { _mm256_load_ps(base.add(offset).cast()) };
+        let slab = |offset: usize, axis: usize, inverse: __m256| {
+            _mm256_mul_ps(_mm256_sub_ps(row(offset), self.origin[axis]), inverse)
+        };
+        let (mut near, mut far) = (self.t_min, far);
+        for axis in 0..3 {
+            near = _mm256_max_ps(slab(self.entry[axis], axis, self.inverse_near[axis]), near);
+            far = _mm256_min_ps(slab(self.exit[axis], axis, self.inverse_far[axis]), far);
+        }
+        (near, _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(near, far)) as u32)
+    }
+
+    /// Meets the ray with the block's triangles: `best` becomes the nearest, and of equals the first by index.
+    /// Returns whether it changed.
+    #[target_feature(enable = "avx2")]
+    #[inline]
+    fn meet(&self, block: &Block, ray: &Prepared, best: &mut Hit, found: &mut bool) -> bool {
+        let corner = |corner: usize| {
+            let rows = &block.corners[corner];
+            // SAFETY: 5; the index of a row is an axis.
+            let row = |i: usize| unsafe { _mm_load_ps(rows.get_unchecked(ray.axes[i]).as_ptr()) };
+            let z = _mm_sub_ps(row(2), self.corner_origin[2]);
+            let across = |i: usize| {
+                _mm_sub_ps(_mm_sub_ps(row(i), self.corner_origin[i]), _mm_mul_ps(self.shear[i], z))
+            };
+            (across(0), across(1), z)
+        };
+        let ((ax, ay, az), (bx, by, bz), (cx, cy, cz)) = (corner(0), corner(1), corner(2));
+        let area = |px, py, qx, qy| _mm_sub_ps(_mm_mul_ps(px, qy), _mm_mul_ps(py, qx));
+        let (u, v, w) = (area(cx, cy, bx, by), area(ax, ay, cx, cy), area(bx, by, ax, ay));
+
+        let zero = _mm_setzero_ps();
+        let least = _mm_min_ps(_mm_min_ps(u, v), w);
+        let most = _mm_max_ps(_mm_max_ps(u, v), w);
+        let inside = _mm_or_ps(_mm_cmpge_ps(least, zero), _mm_cmple_ps(most, zero));
+        if _mm_movemask_ps(inside) == 0 {
+            return false;
+        }
+        let det = _mm_add_ps(_mm_add_ps(u, v), w);
+        let inverse = _mm_div_ps(_mm_set1_ps(1.0), det);
+        let sum = _mm_add_ps(_mm_add_ps(_mm_mul_ps(u, az), _mm_mul_ps(v, bz)), _mm_mul_ps(w, cz));
+        let t = _mm_mul_ps(_mm_mul_ps(sum, self.shear[2]), inverse);
+        let within =
+            _mm_and_ps(_mm_cmpgt_ps(t, _mm_set1_ps(ray.t_min)), _mm_cmple_ps(t, _mm_set1_ps(best.t)));
+        let area = _mm_cmpneq_ps(det, zero);
+        let mut mask = _mm_movemask_ps(_mm_and_ps(_mm_and_ps(inside, within), area)) as u32;
+        if mask == 0 {
+            return false;
+        }
+        let (t, u, v) = (four(t), four(_mm_mul_ps(v, inverse)), four(_mm_mul_ps(w, inverse)));
+        let mut changed = false;
+        while mask != 0 {
+            let lane = mask.trailing_zeros() as usize & 3;
+            mask &= mask.wrapping_sub(1);
+            let triangle = block.triangle[lane];
+            if t[lane] < best.t || (t[lane] == best.t && *found && triangle < best.triangle) {
+                *best = Hit { t: t[lane], triangle, u: u[lane], v: v[lane] };
+                *found = true;
+                changed = true;
+            }
+        }
+        changed
+    }
+}
+
+#[target_feature(enable = "avx2")]
+#[inline]
+fn to_array(x: __m256) -> [f32; 8] {
+    let mut array = [0.0; 8];
+    // SAFETY: the array has eight places.
+    unsafe { _mm256_storeu_ps(array.as_mut_ptr(), x) };
+    array
+}
+
+#[target_feature(enable = "avx2")]
+#[inline]
+fn four(x: __m128) -> [f32; 4] {
+    let mut array = [0.0; 4];
+    // SAFETY: the array has four places.
+    unsafe { _mm_storeu_ps(array.as_mut_ptr(), x) };
+    array
+}
