@@ -1,1 +1,0 @@
-//! glTF file to scene, cameras and warnings.

@@ -1,0 +1,241 @@
+//! glTF 2.0 files to a [`Scene`] in world space, its cameras, and what was odd about the file.
+//!
+//! The gltf crate parses container and JSON; everything it says is checked here before it is used, so that
+//! a broken or hostile file costs an [`Error`] and no panic. Features that a file uses and we lack are
+//! [`Loaded::warnings`], never silence.
+
+mod accessor;
+mod bake;
+mod cameras;
+mod clean;
+mod document;
+mod error;
+mod extensions;
+mod instancing;
+mod lights;
+mod limits;
+mod materials;
+mod nodes;
+mod primitive;
+mod tangents;
+mod textures;
+mod topology;
+mod uri;
+mod warnings;
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+use glam::DAffine3;
+use gltf::json;
+use gltf::json::mesh::Semantic;
+use gltf::json::validation::Checked;
+
+pub use error::Error;
+pub use limits::Limits;
+
+use self::bake::Layout;
+use self::document::Document;
+use self::primitive::{Needs, Primitive};
+use self::warnings::Warnings;
+use crate::scene::{Material, MaterialId};
+use crate::{Camera, Scene};
+
+/// A file, loaded.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// Everything that light meets, in world space.
+    pub scene: Scene,
+    /// Cameras in the order of the file's nodes, parents first; names differ.
+    pub cameras: Vec<Camera>,
+    /// What was left out, replaced or clamped: one line each, with counts.
+    pub warnings: Vec<String>,
+    /// What the file says of itself.
+    pub facts: Facts,
+}
+
+/// What a file says of itself, for `inspect`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Facts {
+    /// `asset.version`.
+    pub version: String,
+    /// `asset.generator`.
+    pub generator: Option<String>,
+    /// `asset.copyright`.
+    pub copyright: Option<String>,
+    /// `extensionsUsed`.
+    pub extensions_used: Vec<String>,
+    /// `extensionsRequired`.
+    pub extensions_required: Vec<String>,
+    /// Nodes in the scene shown.
+    pub nodes: usize,
+    /// Meshes in the file.
+    pub meshes: usize,
+    /// Copies of mesh primitives in the scene, points and lines included.
+    pub instances: u64,
+    /// Triangles in the scene before useless ones were dropped.
+    pub triangles: u64,
+}
+
+/// Loads a `.gltf` or `.glb` file with its buffers and images, within the default [`Limits`].
+pub fn load(path: &Path) -> Result<Loaded, Error> {
+    load_with(path, &Limits::default())
+}
+
+/// Loads a `.gltf` or `.glb` file with its buffers and images.
+///
+/// Only files below the folder of `path` are read. Errors are for what would make the picture wrong, like a
+/// missing buffer; a missing image is a warning.
+pub fn load_with(path: &Path, limits: &Limits) -> Result<Loaded, Error> {
+    // We know of no input that panics, but parsers and decoders of other people are called in here.
+    catch_unwind(AssertUnwindSafe(|| import(path, limits))).unwrap_or_else(|payload| {
+        let text = payload.downcast_ref::<String>().cloned();
+        let text = text.or_else(|| payload.downcast_ref::<&str>().map(|s| s.to_string()));
+        Err(Error::Defect { file: path.into(), problem: text.unwrap_or_else(|| "a panic".into()) })
+    })
+}
+
+fn import(path: &Path, limits: &Limits) -> Result<Loaded, Error> {
+    let mut document = Document::open(path, *limits)?;
+    let mut warnings = Warnings::default();
+    let root = &document.root;
+    extensions::check(path, &root.extensions_used, &root.extensions_required, &mut warnings)?;
+    let mut scene = Scene { materials: materials::read_all(&document, &mut warnings)?, ..Scene::default() };
+    let placed = nodes::walk(&document, &mut warnings)?;
+    let mut cameras = Vec::new();
+    for node in &placed {
+        cameras.extend(cameras::read(&document, node, &mut warnings)?);
+        scene.lights.extend(lights::read(&document, node, &mut warnings)?);
+    }
+    cameras::make_names_differ(&mut cameras);
+    scene.textures = textures::load(&mut document, &mut scene.materials, &mut warnings)?;
+
+    let uses = uses_of_meshes(&document, &placed, &mut warnings)?;
+    let (instances, triangles) = build(&document, &uses, &mut scene, &mut warnings)?;
+    clean::clean(&mut scene, &mut warnings);
+    if scene.mesh.triangles.is_empty() {
+        warnings.say("the scene has no triangles");
+    }
+    let json::Root { asset, extensions_used, extensions_required, meshes, .. } = document.root;
+    let facts = Facts {
+        version: asset.version,
+        generator: asset.generator,
+        copyright: asset.copyright,
+        extensions_used,
+        extensions_required,
+        nodes: placed.len(),
+        meshes: meshes.len(),
+        instances,
+        triangles,
+    };
+    Ok(Loaded { scene, cameras, warnings: warnings.into_lines(), facts })
+}
+
+/// The places where one mesh stands.
+#[derive(Default)]
+struct Uses {
+    /// Node and transform of each.
+    places: Vec<(usize, DAffine3)>,
+}
+
+/// For each mesh of the file, where it stands in the scene.
+fn uses_of_meshes(
+    document: &Document,
+    placed: &[nodes::Placed],
+    warnings: &mut Warnings,
+) -> Result<Vec<Uses>, Error> {
+    let root = &document.root;
+    let mut uses: Vec<Uses> = root.meshes.iter().map(|_| Uses::default()).collect();
+    let mut total = 0;
+    for place in placed {
+        let node = &root.nodes[place.node];
+        let Some(index) = node.mesh else { continue };
+        let m = index.value();
+        let Some(mesh) = root.meshes.get(m) else {
+            return Err(document.fault(
+                format_args!("nodes[{}].mesh", place.node),
+                m,
+                "there is no mesh of this number",
+            ));
+        };
+        let name = || nodes::name(root, place.node);
+        if node.skin.is_some() {
+            warnings.count("skins are not modelled: meshes stand in their bind pose", name(), 1);
+        }
+        if mesh.primitives.iter().any(|p| p.targets.as_ref().is_some_and(|t| !t.is_empty())) {
+            warnings.count("morph targets are not modelled: meshes keep their base shape", name(), 1);
+        }
+        let transforms = instancing::transforms(document, place)?;
+        total += transforms.len() as u64 * mesh.primitives.len() as u64;
+        document.within(
+            format_args!("nodes[{}]", place.node),
+            "instances",
+            total,
+            document.limits.instances,
+        )?;
+        uses[m].places.extend(transforms.iter().map(|&t| (place.node, t)));
+    }
+    Ok(uses)
+}
+
+/// Decodes every mesh in use and bakes it into the scene, as often as it stands there. Returns the numbers
+/// of instances and of triangles.
+fn build(
+    document: &Document,
+    uses: &[Uses],
+    scene: &mut Scene,
+    warnings: &mut Warnings,
+) -> Result<(u64, u64), Error> {
+    let root = &document.root;
+    let used = || root.meshes.iter().zip(uses).enumerate().filter(|(_, (_, u))| !u.places.is_empty());
+    let layout = layout(scene, used().flat_map(|(_, (mesh, _))| &mesh.primitives));
+    // Corners must be countable in 32 bits.
+    let limit = document.limits.triangles.min(u64::from(u32::MAX) / 3);
+    let (mut instances, mut triangles) = (0, 0);
+    let mut default_material = None;
+    for (m, (mesh, uses)) in used() {
+        for (p, json) in mesh.primitives.iter().enumerate() {
+            let at = format!("meshes[{m}].primitives[{p}]");
+            instances += uses.places.len() as u64;
+            let material = match json.material.map(|i| i.value()) {
+                Some(i) if i < root.materials.len() => MaterialId(i as u32),
+                Some(i) => {
+                    return Err(document.fault(
+                        format_args!("{at}.material"),
+                        i,
+                        "there is no material of this number",
+                    ));
+                }
+                None => *default_material.get_or_insert_with(|| {
+                    scene.materials.push(Material::default());
+                    MaterialId((scene.materials.len() - 1) as u32)
+                }),
+            };
+            let normal_map = scene.materials[material.0 as usize].normal_texture.map(|t| t.uv_set);
+            let needs = Needs { uvs: layout.uvs, colors: layout.colors, normal_map };
+            let Some(primitive) = Primitive::read(document, json, &at, needs)? else {
+                warnings.count("points and lines are left out", &at, 1);
+                continue;
+            };
+            triangles += primitive.triangles.len() as u64 * uses.places.len() as u64;
+            document.within(&at, "triangles", triangles, limit)?;
+            for (node, world) in &uses.places {
+                let name = nodes::name(root, *node);
+                let replaced = bake::append(&mut scene.mesh, &primitive, world, material, name, layout);
+                warnings.count("normals replaced by that of a face: zero or not finite", &at, replaced);
+            }
+        }
+    }
+    Ok((instances, triangles))
+}
+
+/// The optional arrays that any material or primitive of the scene can make use of.
+fn layout<'a>(scene: &mut Scene, mut primitives: impl Iterator<Item = &'a json::mesh::Primitive>) -> Layout {
+    let mut layout = Layout::default();
+    for texture in scene.materials.iter_mut().flat_map(materials::texture_refs).flatten() {
+        layout.uvs[usize::from(texture.uv_set.min(1))] = true;
+    }
+    layout.tangents = scene.materials.iter().any(|m| m.normal_texture.is_some());
+    layout.colors = primitives.any(|p| p.attributes.contains_key(&Checked::Valid(Semantic::Colors(0))));
+    layout
+}

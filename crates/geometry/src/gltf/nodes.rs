@@ -1,0 +1,159 @@
+//! The node tree: every node of the scene with its transform to the world.
+
+use glam::{DAffine3, DMat4, DQuat, DVec3};
+use gltf::json;
+
+use super::document::Document;
+use super::error::Error;
+use super::warnings::Warnings;
+
+/// A node of the scene shown, in world space.
+pub(super) struct Placed {
+    /// Index into the file's nodes.
+    pub node: usize,
+    /// Node to world, f64: a deep chain of rotations keeps its precision.
+    pub world: DAffine3,
+}
+
+/// All nodes of the default scene, parents first.
+///
+/// Nodes must form trees (glTF 2.0, 3.5.3): one reached twice is an error, be it by a cycle or by two parents.
+pub(super) fn walk(document: &Document, warnings: &mut Warnings) -> Result<Vec<Placed>, Error> {
+    let nodes = &document.root.nodes;
+    let mut visited = vec![false; nodes.len()];
+    let mut placed = Vec::new();
+    let roots = roots(document, warnings)?;
+    // A stack, not recursion: depth is the file's choice.
+    let mut stack: Vec<(usize, String, DAffine3, usize)> = Vec::new();
+    stack.extend(roots.into_iter().rev().map(|(i, at)| (i, at, DAffine3::IDENTITY, 1)));
+    while let Some((i, at, parent, depth)) = stack.pop() {
+        let node = nodes.get(i).ok_or_else(|| document.fault(&at, i, "there is no node of this number"))?;
+        if std::mem::replace(&mut visited[i], true) {
+            return Err(document.fault(&at, i, "this node is reached twice: a cycle, or two parents"));
+        }
+        document.within(&at, "generations of nodes", depth as u64, document.limits.node_depth as u64)?;
+        let world = parent * local(document, i, node)?;
+        placed.push(Placed { node: i, world });
+        for (k, child) in node.children.as_deref().unwrap_or_default().iter().enumerate().rev() {
+            stack.push((child.value(), format!("nodes[{i}].children[{k}]"), world, depth + 1));
+        }
+    }
+    Ok(placed)
+}
+
+/// Root nodes with the paths that name them.
+fn roots(document: &Document, warnings: &mut Warnings) -> Result<Vec<(usize, String)>, Error> {
+    let root = &document.root;
+    let scene = root.scene.map_or(0, |scene| scene.value());
+    if let Some(chosen) = root.scenes.get(scene) {
+        if root.scene.is_none() && root.scenes.len() > 1 {
+            warnings.say(format!("no default scene among {}: the first is shown", root.scenes.len()));
+        }
+        let list = chosen.nodes.iter().enumerate();
+        return Ok(list.map(|(k, node)| (node.value(), format!("scenes[{scene}].nodes[{k}]"))).collect());
+    }
+    if root.scene.is_some() {
+        return Err(document.fault("scene", scene, "there is no scene of this number"));
+    }
+    if root.nodes.is_empty() {
+        return Ok(Vec::new());
+    }
+    warnings.say("no scene: all root nodes are shown");
+    let mut is_child = vec![false; root.nodes.len()];
+    for child in root.nodes.iter().flat_map(|node| node.children.iter().flatten()) {
+        if let Some(slot) = is_child.get_mut(child.value()) {
+            *slot = true;
+        }
+    }
+    Ok((0..root.nodes.len()).filter(|&i| !is_child[i]).map(|i| (i, format!("nodes[{i}]"))).collect())
+}
+
+/// The node's own transform: its matrix, or translation · rotation · scale.
+fn local(document: &Document, i: usize, node: &json::Node) -> Result<DAffine3, Error> {
+    let check = |member: &str, values: &[f32]| match values.iter().find(|v| !v.is_finite()) {
+        Some(v) => Err(document.fault(format_args!("nodes[{i}].{member}"), v, "not a finite number")),
+        None => Ok(()),
+    };
+    if let Some(matrix) = &node.matrix {
+        check("matrix", matrix)?;
+        // glTF 2.0, 3.5.3: the fourth row is (0, 0, 0, 1).
+        return Ok(DAffine3::from_mat4(DMat4::from_cols_array(&matrix.map(f64::from))));
+    }
+    let translation = node.translation.unwrap_or([0.0; 3]);
+    let rotation = node.rotation.unwrap_or_default().0;
+    let scale = node.scale.unwrap_or([1.0; 3]);
+    check("translation", &translation)?;
+    check("rotation", &rotation)?;
+    check("scale", &scale)?;
+    Ok(trs(translation, rotation, scale))
+}
+
+/// Translation · rotation · scale; a quaternion of length 0 is no rotation, of any other length its direction.
+pub(super) fn trs(translation: [f32; 3], rotation: [f32; 4], scale: [f32; 3]) -> DAffine3 {
+    let q = DQuat::from_array(rotation.map(f64::from));
+    let q = if q.length_squared() > 0.0 { q.normalize() } else { DQuat::IDENTITY };
+    DAffine3::from_scale_rotation_translation(
+        DVec3::from_array(scale.map(f64::from)),
+        q,
+        DVec3::from_array(translation.map(f64::from)),
+    )
+}
+
+/// What messages call a node: its name, its mesh's name, or its number.
+pub(super) fn name(root: &json::Root, i: usize) -> String {
+    let node = root.nodes.get(i);
+    let mesh = node.and_then(|n| n.mesh).and_then(|m| root.meshes.get(m.value()));
+    node.and_then(|n| n.name.clone()).or_else(|| mesh?.name.clone()).unwrap_or_else(|| format!("node {i}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn placed(json: &str) -> Result<Vec<Placed>, String> {
+        walk(&Document::for_test(json, Vec::new()), &mut Warnings::default()).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn transforms_multiply_down_the_tree() {
+        let json = r#""scenes":[{"nodes":[0]}],"nodes":[
+            {"translation":[1,0,0],"scale":[2,2,2],"children":[1]},
+            {"rotation":[0,0,0.70710678,0.70710678],"children":[2]},
+            {"matrix":[1,0,0,0, 0,1,0,0, 0,0,1,0, 3,0,0,1]}]"#;
+        let placed = placed(json).expect("valid");
+        let p = placed[2].world.transform_point3(DVec3::ZERO);
+        assert!((p - DVec3::new(1.0, 6.0, 0.0)).length() < 1e-6, "{p}");
+    }
+
+    #[test]
+    fn cycles_shared_children_and_wrong_numbers_are_errors() {
+        let errors = [
+            (r#""scenes":[{"nodes":[0]}],"nodes":[{"children":[0]}]"#, "nodes[0].children[0] = 0"),
+            (
+                r#""scenes":[{"nodes":[0]}],"nodes":[{"children":[1]},{"children":[0]}]"#,
+                "nodes[1].children[0] = 0",
+            ),
+            (r#""scenes":[{"nodes":[0]}],"nodes":[{"children":[1,1]},{}]"#, "nodes[0].children[1] = 1"),
+            (r#""scenes":[{"nodes":[5]}],"nodes":[{}]"#, "scenes[0].nodes[0] = 5"),
+            (r#""scene":2,"scenes":[{"nodes":[0]}],"nodes":[{}]"#, "scene = 2"),
+            (r#""scenes":[{"nodes":[0]}],"nodes":[{"scale":[1,1e39,1]}]"#, "nodes[0].scale = inf"),
+        ];
+        for (json, place) in errors {
+            let message = placed(json).err().expect(place);
+            assert!(message.contains(place), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_chain_of_a_hundred_thousand_nodes_is_an_error_and_no_overflow() {
+        let chain: Vec<String> = (1..100_000).map(|i| format!(r#"{{"children":[{i}]}}"#)).collect();
+        let json = format!(r#""scenes":[{{"nodes":[0]}}],"nodes":[{},{{}}]"#, chain.join(","));
+        assert!(placed(&json).is_err_and(|e| e.contains("generations")));
+    }
+
+    #[test]
+    fn without_scenes_the_roots_are_shown() {
+        assert_eq!(placed(r#""nodes":[{"children":[1]},{},{}]"#).expect("valid").len(), 3);
+        assert!(placed(r#""meshes":[]"#).expect("valid").is_empty());
+    }
+}
