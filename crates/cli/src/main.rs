@@ -1,3 +1,29 @@
 //! The command line: parses, runs, prints and exits.
 
-fn main() {}
+mod args;
+mod cameras;
+mod commands;
+mod contents;
+mod job;
+mod load;
+mod progress;
+mod values;
+
+use args::{Cli, Command};
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Render(args) => commands::render::run(*args),
+        Command::Inspect(args) => commands::inspect::run(&args),
+        Command::Compare(args) => commands::compare::run(&args),
+    };
+    match result {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(if error.is::<job::AskedWrongly>() { 2 } else { 1 })
+        }
+    }
+}

@@ -7,7 +7,9 @@ pub mod film;
 pub mod flip;
 pub mod metrics;
 pub mod output;
+pub mod render;
 pub mod tonemap;
 
 pub use error::Error;
 pub use film::{Film, Pixel};
+pub use render::{DiffuseMode, Integrator, Outcome, Progress, Report, Settings, render};

@@ -1,0 +1,194 @@
+//! `twolight render`: a scene to an EXR, and a picture to look at.
+
+use super::print;
+use crate::args::RenderArgs;
+use crate::job::{RenderJob, with_name};
+use crate::progress::Bars;
+use crate::{cameras, load};
+use anyhow::{Context, Result};
+use geometry::{Camera, Scene, World};
+use raytrace::exr::Metadata;
+use raytrace::{Integrator, Outcome, Progress, Settings, exr, render, tonemap};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// Runs the command; failure if the user stopped it, though what there was is saved.
+pub fn run(args: RenderArgs) -> Result<ExitCode> {
+    let job = RenderJob::new(args)?;
+    let bars = Bars::new(job.quiet);
+    if let Some(n) = job.threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(n as usize)
+            .build_global()
+            .context("cannot start threads")?;
+    }
+    bars.listen_for_interrupts();
+
+    bars.stage("load", 0);
+    let mut loaded = load::scene(&job.scene)?;
+    for warning in &loaded.warnings {
+        bars.note(&format!("warning: {warning}"));
+    }
+    if let Some((value, strength)) = &job.sky {
+        loaded.scene.sky = Some(load::sky(value, *strength)?);
+    }
+    let choice = cameras::choose(job.camera.as_deref(), &loaded.cameras, &loaded.scene)?;
+    if let Some(note) = &choice.note {
+        bars.note(&format!("note: {note}"));
+    }
+    if !is_lit(&loaded.scene) {
+        bars.note("warning: nothing in the file shines, the picture will be black: try --sky 1000 (cd/m2)");
+    }
+
+    bars.stage("build", 0);
+    let world = World::new(loaded.scene);
+    let several = job.camera.as_deref() == Some("all");
+    let mut pictures = Vec::new();
+    for camera in &choice.cameras {
+        let path = |base: &Path| if several { with_name(base, &camera.name) } else { base.to_path_buf() };
+        let (output, preview) = (path(&job.output), job.preview.as_deref().map(path));
+        let settings = job.settings(camera)?;
+        let started = Instant::now();
+        let outcome = render(&world, camera, &settings, &bars);
+        bars.done();
+        let picture = save(&job, camera, &settings, outcome, output, preview, started)?;
+        if picture.repaired > 0 {
+            let message = "pixels were not finite or negative and are black instead; please report it";
+            bars.note(&format!("warning: {} {message}", picture.repaired));
+        }
+        if !job.json {
+            print(&picture.line())?;
+        }
+        pictures.push(picture);
+        if bars.interrupted() {
+            break;
+        }
+    }
+    if job.json {
+        let report = Report { scene: job.scene, warnings: loaded.warnings, pictures };
+        print(&serde_json::to_string_pretty(&report)?)?;
+    }
+    Ok(if bars.interrupted() { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report {
+    scene: PathBuf,
+    warnings: Vec<String>,
+    pictures: Vec<Picture>,
+}
+
+/// One picture that was written.
+#[derive(Serialize)]
+struct Picture {
+    output: PathBuf,
+    preview: Option<PathBuf>,
+    camera: String,
+    width: u32,
+    height: u32,
+    finished: bool,
+    seconds: f64,
+    stages: BTreeMap<&'static str, f64>,
+    rays: u64,
+    exposure: Option<f32>,
+    repaired: u64,
+    report: BTreeMap<String, String>,
+}
+
+impl Picture {
+    fn line(&self) -> String {
+        let mut line = format!(
+            "{}: {}x{}, camera {:?}, {:.1} s",
+            self.output.display(),
+            self.width,
+            self.height,
+            self.camera,
+            self.seconds
+        );
+        if let (Some(preview), Some(ev)) = (&self.preview, self.exposure) {
+            line += &format!("; {} at EV {ev:.1}", preview.display());
+        }
+        if !self.finished {
+            line += "; unfinished";
+        }
+        for (name, value) in &self.report {
+            line += &format!("\n  {name}: {value}");
+        }
+        line
+    }
+}
+
+/// Writes what was rendered.
+fn save(
+    job: &RenderJob,
+    camera: &Camera,
+    settings: &Settings,
+    outcome: Outcome,
+    output: PathBuf,
+    preview: Option<PathBuf>,
+    started: Instant,
+) -> Result<Picture> {
+    let Outcome { film, finished, report } = outcome;
+    exr::write(&film, &metadata(camera, settings, finished, &report.texts), &output)?;
+    let mut exposure = None;
+    if let Some(path) = &preview {
+        let beauty = film.beauty();
+        let ev = job.exposure.unwrap_or_else(|| tonemap::automatic_exposure(&beauty));
+        tonemap::write_png(film.width, film.height, &tonemap::to_srgb(&beauty, ev), path)?;
+        exposure = Some(ev);
+    }
+    Ok(Picture {
+        output,
+        preview,
+        camera: camera.name.clone(),
+        width: film.width,
+        height: film.height,
+        finished,
+        seconds: started.elapsed().as_secs_f64(),
+        stages: report.stages.into_iter().collect(),
+        rays: report.rays,
+        exposure,
+        repaired: film.repaired,
+        report: report.texts.into_iter().collect(),
+    })
+}
+
+/// What the EXR says of itself. Nothing that differs between two runs of the same job.
+fn metadata(camera: &Camera, settings: &Settings, finished: bool, texts: &[(String, String)]) -> Metadata {
+    let mut metadata = Metadata { world_to_camera: Some(camera.to_world.inverse()), texts: texts.to_vec() };
+    metadata.push("units", "cd/m2; irradiance lx; depth and position m");
+    metadata.push("camera", &camera.name);
+    metadata.push("seed", settings.seed);
+    match settings.integrator {
+        Integrator::Hybrid => {
+            metadata.push("integrator", "hybrid");
+            metadata.push("diffuse", format!("{:?}", settings.diffuse).to_lowercase());
+            metadata.push("error asked", format!("{} %", 100.0 * settings.error));
+        }
+        Integrator::Path { spp } => {
+            metadata.push("integrator", "path");
+            metadata.push("samples", spp);
+        }
+    }
+    for (name, value) in [("gather rays", settings.gather_rays), ("samples", settings.samples)] {
+        if let Some(value) = value {
+            metadata.push(name, value);
+        }
+    }
+    if !finished {
+        metadata.push("unfinished", "stopped before the error asked was reached");
+    }
+    metadata
+}
+
+/// Whether anything shines.
+fn is_lit(scene: &Scene) -> bool {
+    let used = |m: &geometry::MaterialId| {
+        scene.materials.get(m.0 as usize).is_some_and(|m| m.unlit || !m.emissive.is_black())
+    };
+    scene.sky.is_some() || !scene.lights.is_empty() || scene.mesh.materials.iter().any(used)
+}

@@ -1,0 +1,236 @@
+//! What was typed, checked: a job that can be done, or the reason why not.
+
+use crate::args::{DiffuseArg, IntegratorArg, RenderArgs};
+use crate::values::SkyValue;
+use anyhow::Result;
+use geometry::Camera;
+use raytrace::output::check_writable;
+use raytrace::{DiffuseMode, Integrator, Settings};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Pixels on the shorter side where no size is asked for.
+const SHORTER_SIDE: f32 = 512.0;
+/// Width over height where neither file nor user says: that of most rooms' pictures.
+const USUAL_ASPECT: f32 = 4.0 / 3.0;
+/// Most pixels of a picture: the film takes about 120 bytes for each, so 12 GB here.
+const MOST_PIXELS: u64 = 100_000_000;
+/// Paths through each pixel where none are asked for.
+const USUAL_SPP: u32 = 256;
+
+/// A request that no scene could satisfy, or that this scene cannot: exit status 2.
+#[derive(Debug)]
+pub struct AskedWrongly(pub String);
+
+impl std::fmt::Display for AskedWrongly {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} (see --help)", self.0)
+    }
+}
+
+impl std::error::Error for AskedWrongly {}
+
+/// A render that can begin.
+#[derive(Debug)]
+pub struct RenderJob {
+    /// Scene file.
+    pub scene: PathBuf,
+    /// EXR to write.
+    pub output: PathBuf,
+    /// PNG to write.
+    pub preview: Option<PathBuf>,
+    /// Exposure value of the preview; automatic if absent.
+    pub exposure: Option<f32>,
+    /// Which camera, as typed.
+    pub camera: Option<String>,
+    /// Light from beyond the scene, and its factor.
+    pub sky: Option<(SkyValue, f32)>,
+    /// Result as JSON.
+    pub json: bool,
+    /// No notes.
+    pub quiet: bool,
+    /// Threads; all if absent.
+    pub threads: Option<u32>,
+    size: Size,
+    error: f32,
+    seed: u64,
+    integrator: Integrator,
+    diffuse: DiffuseMode,
+    time_limit: Option<Duration>,
+    gather_rays: Option<u32>,
+    samples: Option<u32>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Size {
+    Both(u32, u32),
+    Width(u32),
+    Usual,
+}
+
+impl RenderJob {
+    /// Checks what can be checked before the scene is read; above all, that the pictures can be written.
+    pub fn new(args: RenderArgs) -> Result<RenderJob> {
+        let wrong = |message: String| Err(AskedWrongly(message).into());
+        let path_traced = args.integrator == IntegratorArg::Path;
+        if args.spp.is_some() && !path_traced {
+            return wrong("--spp counts paths: it needs --integrator path; the hybrid has --samples".into());
+        }
+        if path_traced && (args.diffuse.is_some() || args.gather_rays.is_some() || args.samples.is_some()) {
+            return wrong(
+                "--diffuse, --gather-rays and --samples steer the hybrid, not --integrator path".into(),
+            );
+        }
+        if let Some((w, h)) = args.size {
+            check_size(w, h)?;
+        }
+        if !args.scene.is_file() {
+            let why = if args.scene.is_dir() { "it is a folder" } else { "there is no such file" };
+            anyhow::bail!("cannot read {}: {why}", args.scene.display());
+        }
+        let extension =
+            |p: &Path| p.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+        if matches!(extension(&args.output).as_str(), "png" | "jpg" | "jpeg" | "hdr" | "gltf" | "glb" | "tif")
+        {
+            return wrong(format!(
+                "{} is written as EXR: name it .exr (--preview writes a PNG)",
+                args.output.display()
+            ));
+        }
+        if let Some(preview) = &args.preview
+            && extension(preview) != "png"
+        {
+            return wrong(format!("the preview {} is written as PNG: name it .png", preview.display()));
+        }
+        for path in [Some(&args.output), args.preview.as_ref()].into_iter().flatten() {
+            check_writable(path)?;
+        }
+        Ok(RenderJob {
+            scene: args.scene,
+            output: args.output,
+            preview: args.preview,
+            exposure: args.exposure,
+            camera: args.camera,
+            sky: args.sky.map(|sky| (sky, args.sky_strength)),
+            json: args.json,
+            quiet: args.quiet,
+            threads: args.threads,
+            size: match (args.size, args.width) {
+                (Some((w, h)), _) => Size::Both(w, h),
+                (None, Some(w)) => Size::Width(w),
+                (None, None) => Size::Usual,
+            },
+            error: args.error,
+            seed: args.seed,
+            integrator: match args.integrator {
+                IntegratorArg::Hybrid => Integrator::Hybrid,
+                IntegratorArg::Path => Integrator::Path { spp: args.spp.unwrap_or(USUAL_SPP) },
+            },
+            diffuse: match args.diffuse.unwrap_or(DiffuseArg::Split) {
+                DiffuseArg::Vertex => DiffuseMode::Vertex,
+                DiffuseArg::Split => DiffuseMode::Split,
+                DiffuseArg::Gather => DiffuseMode::Gather,
+            },
+            time_limit: args.time_limit,
+            gather_rays: args.gather_rays,
+            samples: args.samples,
+        })
+    }
+
+    /// The settings for one camera; the time limit starts to run now.
+    pub fn settings(&self, camera: &Camera) -> Result<Settings> {
+        let (width, height) = self.picture_size(camera.aspect)?;
+        Ok(Settings {
+            width,
+            height,
+            seed: self.seed,
+            error: self.error,
+            integrator: self.integrator,
+            diffuse: self.diffuse,
+            deadline: self.time_limit.map(|limit| Instant::now() + limit),
+            gather_rays: self.gather_rays,
+            samples: self.samples,
+        })
+    }
+
+    /// Columns and rows for a camera whose file states `aspect`, width over height, or nothing.
+    fn picture_size(&self, aspect: Option<f32>) -> Result<(u32, u32)> {
+        let aspect = aspect.filter(|a| a.is_finite() && *a > 0.0).unwrap_or(USUAL_ASPECT);
+        let pixels = |v: f32| v.round().clamp(1.0, u32::MAX as f32) as u32;
+        let (w, h) = match self.size {
+            Size::Both(w, h) => (w, h),
+            Size::Width(w) => (w, pixels(w as f32 / aspect)),
+            Size::Usual if aspect >= 1.0 => (pixels(SHORTER_SIDE * aspect), SHORTER_SIDE as u32),
+            Size::Usual => (SHORTER_SIDE as u32, pixels(SHORTER_SIDE / aspect)),
+        };
+        check_size(w, h)?;
+        Ok((w, h))
+    }
+}
+
+fn check_size(w: u32, h: u32) -> Result<()> {
+    match u64::from(w) * u64::from(h) <= MOST_PIXELS {
+        true => Ok(()),
+        false => Err(AskedWrongly(format!("{w}x{h} is more than {MOST_PIXELS} pixels")).into()),
+    }
+}
+
+/// `path` with `name` before its extension, for the picture of one of several cameras: out.exr, Hall: out.Hall.exr.
+/// Characters that a file name cannot have on some system become `_`.
+pub fn with_name(path: &Path, name: &str) -> PathBuf {
+    let unfit = |c: char| c.is_control() || "/\\:*?\"<>|".contains(c);
+    let name: String = name.chars().map(|c| if unfit(c) { '_' } else { c }).collect();
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let extension = path.extension().map(|e| format!(".{}", e.to_string_lossy())).unwrap_or_default();
+    path.with_file_name(format!("{stem}.{name}{extension}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::args::{Cli, Command};
+    use clap::Parser;
+
+    /// The job of `render SCENE -o OUT` and `more`, for files that can be read and written.
+    fn job(more: &[&str]) -> Result<RenderJob> {
+        let dir = tempfile::tempdir().unwrap();
+        let (scene, out) = (dir.path().join("a.glb"), dir.path().join("a.exr"));
+        std::fs::write(&scene, "").unwrap();
+        let fixed = ["twolight", "render", scene.to_str().unwrap(), "-o", out.to_str().unwrap()];
+        let cli = Cli::try_parse_from(fixed.iter().chain(more)).unwrap();
+        let Command::Render(args) = cli.command else { panic!("render was asked for") };
+        RenderJob::new(*args)
+    }
+
+    #[test]
+    fn the_shorter_side_has_512_pixels_unless_a_size_is_given() {
+        let size = |more: &[&str], aspect| job(more).unwrap().picture_size(aspect).unwrap();
+        assert_eq!(size(&[], Some(1.0)), (512, 512));
+        assert_eq!(size(&[], Some(2.0)), (1024, 512));
+        assert_eq!(size(&[], Some(0.5)), (512, 1024));
+        assert_eq!(size(&[], None), (683, 512));
+        assert_eq!(size(&["--width", "300"], Some(1.5)), (300, 200));
+        assert_eq!(size(&["--size", "10x20"], Some(1.5)), (10, 20));
+        assert!(job(&[]).unwrap().picture_size(Some(1e30)).is_err());
+    }
+
+    #[test]
+    fn options_of_the_other_method_are_refused() {
+        for wrong in [
+            &["--spp", "4"][..],
+            &["--integrator", "path", "--diffuse", "split"],
+            &["--integrator", "path", "--samples", "4"],
+            &["--size", "100000x100000"],
+            &["--preview", "a.jpg"],
+        ] {
+            assert!(job(wrong).unwrap_err().is::<AskedWrongly>(), "{wrong:?}");
+        }
+        assert_eq!(job(&["--integrator", "path"]).unwrap().integrator, Integrator::Path { spp: USUAL_SPP });
+    }
+
+    #[test]
+    fn names_of_cameras_become_names_of_files() {
+        assert_eq!(with_name(Path::new("d/out.exr"), "Hall 2"), Path::new("d/out.Hall 2.exr"));
+        assert_eq!(with_name(Path::new("out.exr"), "a/../b"), Path::new("out.a_.._b.exr"));
+    }
+}

@@ -1,0 +1,98 @@
+//! What goes on, on stderr: a bar for each stage, and Ctrl-C.
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use raytrace::Progress;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+/// Bars on stderr with the time left; silent where stderr is no terminal, or on request.
+#[derive(Debug)]
+pub struct Bars {
+    bar: Mutex<ProgressBar>,
+    shown: bool,
+    quiet: bool,
+    stop: Arc<AtomicBool>,
+}
+
+impl Bars {
+    /// `quiet`: no bars, no notes.
+    pub fn new(quiet: bool) -> Bars {
+        use std::io::IsTerminal;
+        Bars {
+            bar: Mutex::new(ProgressBar::hidden()),
+            shown: !quiet && std::io::stderr().is_terminal(),
+            quiet,
+            stop: Arc::default(),
+        }
+    }
+
+    /// From now on the first Ctrl-C asks the render to end with what it has, the second ends the process.
+    pub fn listen_for_interrupts(&self) {
+        let stop = Arc::clone(&self.stop);
+        let handler = move || {
+            if stop.swap(true, Ordering::Relaxed) {
+                // 128 + SIGINT, as shells report it.
+                std::process::exit(130);
+            }
+            eprintln!("\nstopping: saving what there is (Ctrl-C again quits at once)");
+        };
+        // Without a handler Ctrl-C ends the process as ever, so a failure to set it is no reason to fail.
+        let _ = ctrlc::set_handler(handler);
+    }
+
+    /// Whether the user asked to stop.
+    pub fn interrupted(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    /// One line on stderr, above the bar, unless quiet.
+    pub fn note(&self, text: &str) {
+        if !self.quiet {
+            self.with(|bar| bar.suspend(|| eprintln!("{text}")));
+        }
+    }
+
+    /// Ends the last stage.
+    pub fn done(&self) {
+        self.with(|bar| bar.finish_and_clear());
+    }
+
+    fn with<T>(&self, f: impl FnOnce(&mut ProgressBar) -> T) -> T {
+        // A thread that panicked while drawing leaves a bar that is still good enough.
+        f(&mut self.bar.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl Progress for Bars {
+    /// A stage of unknown length has `total` 0.
+    fn stage(&self, name: &'static str, total: u64) {
+        if !self.shown {
+            return;
+        }
+        let template = match total {
+            0 => "{msg:>10} {spinner} {elapsed}",
+            _ => "{msg:>10} [{bar:40}] {percent:>3} %  {elapsed}, {eta} left",
+        };
+        // The templates are ours; were one wrong, indicatif's default does.
+        let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        let next = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(10))
+            .with_style(style.progress_chars("=> "))
+            .with_message(name);
+        next.enable_steady_tick(Duration::from_millis(200));
+        self.with(|bar| {
+            bar.finish_and_clear();
+            *bar = next;
+        });
+    }
+
+    fn advance(&self, n: u64) {
+        if self.shown {
+            self.with(|bar| bar.inc(n));
+        }
+    }
+
+    fn stopped(&self) -> bool {
+        self.interrupted()
+    }
+}

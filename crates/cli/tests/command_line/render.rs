@@ -1,0 +1,121 @@
+//! `twolight render`.
+
+use super::{folder, scene, twolight};
+use std::fs;
+
+fn cornell() -> String {
+    scene("cornell-box.gltf").to_str().expect("the repository's path is UTF-8").into()
+}
+
+#[test]
+fn a_picture_is_written_and_described() {
+    let dir = folder();
+    let args =
+        ["render", &cornell(), "-o", "a.exr", "--preview", "a.png", "--size", "16x12", "--error", "20%"];
+    let run = twolight(dir.path(), &args);
+    assert_eq!(run.status, 0, "{}", run.err);
+    assert!(run.out.starts_with("a.exr: 16x12"), "{}", run.out);
+    let image = raytrace::exr::read_rgb(&dir.path().join("a.exr")).expect("an EXR was written");
+    assert_eq!((image.width, image.height), (16, 12));
+    assert!(dir.path().join("a.png").is_file());
+    let beauty: geometry::Rgb = image.pixels.into_iter().sum();
+    let layer = |name| -> geometry::Rgb {
+        let layer = raytrace::exr::read_layer(&dir.path().join("a.exr"), name).expect("the layer is there");
+        layer.pixels.into_iter().sum()
+    };
+    let sum: geometry::Rgb = ["direct", "indirect", "specular", "emission"].into_iter().map(layer).sum();
+    assert!((beauty - sum).luminance().abs() < 1e-2 * beauty.luminance(), "{beauty:?} {sum:?}");
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
+    let dir = folder();
+    let render = |out: &str, threads: &str| {
+        let args =
+            ["render", &cornell(), "-o", out, "--size", "24x16", "--error", "20%", "--threads", threads];
+        let run = twolight(dir.path(), &args);
+        assert_eq!(run.status, 0, "{}", run.err);
+        fs::read(dir.path().join(out)).expect("it was written")
+    };
+    assert!(render("1.exr", "1") == render("3.exr", "3"));
+}
+
+#[test]
+fn json_describes_the_picture() {
+    let dir = folder();
+    let args = ["render", &cornell(), "-o", "a.exr", "--width", "16", "--error", "20%", "--json"];
+    let run = twolight(dir.path(), &args);
+    let json: serde_json::Value = serde_json::from_str(&run.out).expect("stdout is JSON and nothing else");
+    let picture = &json["pictures"][0];
+    assert_eq!((picture["output"].as_str(), picture["width"].as_u64()), (Some("a.exr"), Some(16)));
+    assert_eq!(picture["finished"], true);
+}
+
+#[test]
+fn no_time_gives_an_unfinished_picture() {
+    let dir = folder();
+    let args = ["render", &cornell(), "-o", "a.exr", "--size", "64x64", "--time-limit", "0.000001s"];
+    let run = twolight(dir.path(), &args);
+    assert_eq!(run.status, 0, "{}", run.err);
+    assert!(run.out.contains("unfinished"), "{}", run.out);
+    let bytes = fs::read(dir.path().join("a.exr")).expect("it was written");
+    assert!(bytes.windows(19).any(|w| w == b"twolight:unfinished"));
+}
+
+#[test]
+fn what_cannot_work_fails_at_once_with_one_line_that_names_it() {
+    let dir = folder();
+    fs::write(dir.path().join("bad.glb"), "no scene").expect("it can be written");
+    fs::write(dir.path().join("old.exr"), "precious").expect("it can be written");
+    let cornell = cornell();
+    for (args, word) in [
+        (["render", "absent.glb", "-o", "old.exr"], "absent.glb"),
+        (["render", "bad.glb", "-o", "old.exr"], "bad.glb"),
+        (["render", ".", "-o", "old.exr"], "folder"),
+        (["render", &cornell, "-o", "no/such/folder/a.exr"], "no/such/folder"),
+        (["render", &cornell, "-o", "."], "folder"),
+    ] {
+        let run = twolight(dir.path(), &args);
+        assert_eq!(run.status, 1, "{args:?}: {}", run.err);
+        assert!(run.err.contains(word) && run.err.lines().count() == 1, "{args:?}: {}", run.err);
+        assert!(run.out.is_empty());
+    }
+    assert_eq!(fs::read(dir.path().join("old.exr")).expect("it is still there"), b"precious");
+    assert_eq!(fs::read_dir(dir.path()).expect("it is a folder").count(), 2, "nothing is left beside");
+}
+
+#[test]
+fn an_unknown_camera_or_a_wrong_kind_of_file_is_asked_wrongly() {
+    let dir = folder();
+    let cornell = cornell();
+    for more in
+        [["-o", "a.exr", "--camera", "Attic"], ["-o", "a.png", "--seed", "2"], ["-o", "a.glb", "--seed", "2"]]
+    {
+        let run = twolight(dir.path(), &[&["render", &cornell][..], &more].concat());
+        assert_eq!(run.status, 2, "{more:?}: {}", run.err);
+    }
+    assert_eq!(fs::read_dir(dir.path()).expect("it is a folder").count(), 0);
+}
+
+#[test]
+fn a_dark_or_cameraless_scene_is_told_so_unless_quiet() {
+    let dir = folder();
+    let gltf = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}],
+        "bufferViews":[{"buffer":0,"byteLength":36}],
+        "buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
+    fs::write(dir.path().join("dark.gltf"), gltf).expect("it can be written");
+    let render = |more: &[&str]| {
+        let run = twolight(
+            dir.path(),
+            &[&["render", "dark.gltf", "-o", "a.exr", "--size", "8x8"][..], more].concat(),
+        );
+        assert_eq!(run.status, 0, "{}", run.err);
+        run.err
+    };
+    let notes = render(&[]);
+    assert!(notes.contains("--sky") && notes.contains("no camera"), "{notes}");
+    assert!(!render(&["--sky", "100"]).contains("nothing in the file shines"));
+    assert_eq!(render(&["--quiet"]), "");
+}
