@@ -1,5 +1,8 @@
 //! Our chores, as `cargo xtask NAME`.
 
+mod check;
+#[cfg(test)]
+mod ourselves;
 mod scenes;
 
 use anyhow::Result;
@@ -16,6 +19,12 @@ struct Args {
 
 #[derive(Subcommand)]
 enum Chore {
+    /// Run everything that must pass before a change lands
+    Check {
+        /// Leave out a step
+        #[arg(long, value_parser = clap::builder::PossibleValuesParser::new(check::names()))]
+        without: Vec<String>,
+    },
     /// Write the scenes that a function describes into assets/
     Scenes {
         /// Write nothing; fail if a file in assets/ differs from what its function gives
@@ -26,6 +35,7 @@ enum Chore {
 
 fn main() -> Result<()> {
     match Args::parse().chore {
+        Chore::Check { without } => check::run(&without),
         Chore::Scenes { check: false } => scenes::write(&root().join("assets")),
         Chore::Scenes { check: true } => scenes::check(&root().join("assets")),
     }
