@@ -1,1 +1,0 @@
-//! The shading model: eval, sample and pdf of each lobe.

@@ -1,1 +1,0 @@
-//! Square to disc, hemisphere, triangle, with the pdf beside each; seeded streams of numbers.

@@ -1,0 +1,85 @@
+//! The material at one point: textures looked up, factors multiplied, normals turned toward the ray.
+
+mod lookup;
+mod material;
+mod normals;
+#[cfg(test)]
+mod tests;
+
+pub use lookup::{coverage_at, emission_at, shading_at, straight_through};
+
+use crate::bsdf::Bsdf;
+use crate::math::Vec3;
+use crate::{Hit, MaterialId, Ray, Rgb, Scene, Volume};
+use lookup::Point;
+
+/// What a ray met. All normals are unit and on the side the ray came from.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    /// Where, from the triangle's corners rather than along the ray: exact to an ulp of the coordinates.
+    pub position: Vec3,
+    /// Which triangle.
+    pub triangle: u32,
+    /// Weight of its second corner.
+    pub u: f32,
+    /// Weight of its third corner.
+    pub v: f32,
+    /// Whether the ray met the triangle's front.
+    pub front: bool,
+    /// Geometric normal.
+    pub ng: Vec3,
+    /// Shading normal, normal map applied; at least barely on the side of both `ng` and the ray's origin.
+    pub ns: Vec3,
+    /// Interpolated vertex normal, without the normal map.
+    pub smooth: Vec3,
+    /// The material.
+    pub material: MaterialId,
+    /// Share of the light that meets the surface at all, [0, 1]; the rest goes straight on. 0 or 1 for a mask.
+    pub coverage: f32,
+    /// Own radiance toward the ray's origin, cd/m²; black on the back unless double-sided. Not weighted by coverage.
+    pub emission: Rgb,
+    /// The colour of an unlit material, cd/m², which replaces all shading (KHR_materials_unlit).
+    pub unlit: Option<Rgb>,
+    /// Reflection and transmission; nothing for an unlit material.
+    pub bsdf: Bsdf,
+    /// What the material encloses, when it transmits light and bounds a volume.
+    pub volume: Option<Volume>,
+}
+
+impl Surface {
+    /// The surface of `scene` that `ray` met at `hit`.
+    pub fn new(scene: &Scene, ray: &Ray, hit: &Hit) -> Surface {
+        let point = Point::new(scene, hit.triangle, hit.u, hit.v);
+        let material = point.material;
+        let normals = point.normals(-ray.direction);
+        let (base_color, alpha) = point.base_color();
+        let shading = if material.unlit { lookup::NOTHING } else { point.shading(base_color) };
+        Surface {
+            position: point.position(),
+            triangle: hit.triangle,
+            u: hit.u,
+            v: hit.v,
+            front: normals.front,
+            ng: normals.geometric,
+            ns: normals.shading,
+            smooth: normals.smooth,
+            material: scene.mesh.materials[hit.triangle as usize],
+            coverage: point.coverage(alpha),
+            emission: point.emission(normals.front),
+            unlit: material.unlit.then_some(base_color),
+            bsdf: Bsdf::new(&shading, normals.shading, normals.geometric, normals.front),
+            volume: material.enclosed(),
+        }
+    }
+
+    /// What the ray travelled through on its way here, as far as this surface tells: its volume when the ray met
+    /// the back, `None` for air. The caller attenuates by the length of the way.
+    pub fn interior(&self) -> Option<Volume> {
+        if self.front { None } else { self.volume }
+    }
+
+    /// What lies beyond the surface: its volume when the ray met the front.
+    pub fn beyond(&self) -> Option<Volume> {
+        if self.front { self.volume } else { None }
+    }
+}
