@@ -209,10 +209,7 @@ mod tests {
         );
         assert_eq!(scene.mesh.corners(0), T);
         let lines = warnings.into_lines();
-        assert!(
-            lines[0].ends_with("2 (first: part 0)") && lines[1].ends_with("1 (first: part 2)"),
-            "{lines:?}"
-        );
+        assert!(lines[0].ends_with("2 (part 0, part 3)") && lines[1].ends_with("1 (part 2)"), "{lines:?}");
     }
 
     #[test]

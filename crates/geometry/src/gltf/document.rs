@@ -33,11 +33,11 @@ impl Document {
             Document { file: file.into(), root: json::Root::default(), limits, buffers: Vec::new(), read: 0 };
         let bytes = document.read_file(file)?;
         let container = |problem: String| Error::Container { file: file.into(), problem };
-        let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes);
-        let parsed = gltf::Gltf::from_slice_without_validation(bytes).map_err(|e| container(describe(&e)))?;
-        document.root = parsed.document.into_json();
+        let (root, blob) = parse(&bytes).map_err(container)?;
+        drop(bytes);
+        document.root = root;
         document.check_version()?;
-        document.read_buffers(parsed.blob)?;
+        document.read_buffers(blob)?;
         Ok(document)
     }
 
@@ -168,13 +168,40 @@ impl Document {
     }
 }
 
-/// The gltf crate's message; for JSON that includes line and column.
-fn describe(error: &gltf::Error) -> String {
-    match error {
-        gltf::Error::Deserialize(e) => format!("JSON: {e}"),
+/// JSON and the binary chunk of a GLB, or the JSON alone.
+fn parse(bytes: &[u8]) -> Result<(json::Root, Option<Vec<u8>>), String> {
+    if !bytes.starts_with(b"glTF") {
+        return Ok((parse_json(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes))?, None));
+    }
+    // What follows the length stated in the header is to be ignored (glTF 2.0, 4.4.1), which the gltf crate
+    // does not; where the file is shorter than stated, it says so.
+    let length = bytes.get(8..12).and_then(|b| b.try_into().ok()).map_or(0, u32::from_le_bytes) as usize;
+    if length < 12 {
+        return Err(format!("GLB: a stated length of {length} bytes"));
+    }
+    let glb = gltf::Glb::from_slice(bytes.get(..length).unwrap_or(bytes)).map_err(|e| match e {
         gltf::Error::Binary(e) => format!("GLB: {e}"),
         e => e.to_string(),
-    }
+    })?;
+    Ok((parse_json(&glb.json)?, glb.bin.map(|bin| bin.into_owned())))
+}
+
+fn parse_json(text: &[u8]) -> Result<json::Root, String> {
+    json::Root::from_slice(text).or_else(|error| {
+        // The gltf crate insists on members that glTF leaves optional: a scene's nodes, and the target of an
+        // animation, which is no concern of ours. Such files are rare: only they are parsed twice.
+        let mut value: json::Value =
+            json::deserialize::from_slice(text).map_err(|_| format!("JSON: {error}"))?;
+        if let Some(members) = value.as_object_mut() {
+            members.remove("animations");
+            let scenes = members.get_mut("scenes").and_then(|scenes| scenes.as_array_mut());
+            for scene in scenes.into_iter().flatten().filter_map(|scene| scene.as_object_mut()) {
+                scene.entry("nodes").or_insert(json::Value::Array(Vec::new()));
+            }
+        }
+        // The first message has line and column.
+        json::deserialize::from_value(value).map_err(|_| format!("JSON: {error}"))
+    })
 }
 
 #[cfg(test)]
@@ -193,5 +220,48 @@ impl Document {
             buffers: vec![Some(buffer)],
             read: 0,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn members_that_gltf_leaves_optional_may_be_absent() {
+        let text = br#"{"asset":{"version":"2.0"},"scenes":[{}],"animations":[{"channels":[{"target":{"path":"pointer"},
+            "sampler":0}],"samplers":[]}]}"#;
+        assert_eq!(parse_json(text).expect("legal").scenes.len(), 1);
+        assert!(parse_json(br#"{"asset":{"version":2}}"#).is_err_and(|e| e.contains("line 1")));
+    }
+
+    #[test]
+    fn bytes_after_a_glb_are_ignored_and_missing_ones_are_not() {
+        let json = br#"{"asset":{"version":"2.0"}} "#;
+        let mut glb = b"glTF\x02\0\0\0\x30\0\0\0\x1c\0\0\0JSON".to_vec();
+        glb.extend(json);
+        assert!(parse(&glb).is_ok());
+        assert!(parse(&[&glb[..], b"tail"].concat()).is_ok());
+        assert!(parse(&glb[..glb.len() - 1]).is_err());
+        for length in 0..20 {
+            // In whatever place it ends, and whatever length the header states.
+            assert!(parse(&glb[..length]).is_err());
+            glb[8] = length as u8;
+            assert!(parse(&glb).is_err());
+        }
+    }
+
+    #[test]
+    fn views_are_checked_against_their_buffer() {
+        let views = r#""bufferViews":[{"buffer":0,"byteOffset":2,"byteLength":2},{"buffer":0,"byteLength":5},
+            {"buffer":1,"byteLength":1},{"buffer":0,"byteOffset":18446744073709551615,"byteLength":2}]"#;
+        let document = Document::for_test(views, vec![1, 2, 3, 4]);
+        let view = |i| {
+            document.view(json::Index::new(i), &"test").map(|(b, _)| b.to_vec()).map_err(|e| e.to_string())
+        };
+        assert_eq!(view(0), Ok(vec![3, 4]));
+        assert!(view(1).is_err_and(|e| e.contains("bufferViews[1].byteOffset + byteLength = 0 + 5")));
+        assert!(view(2).is_err_and(|e| e.contains("bufferViews[2].buffer = 1")));
+        assert!(view(3).is_err() && view(4).is_err_and(|e| e.contains("test.bufferView = 4")));
     }
 }

@@ -45,11 +45,7 @@ pub(super) fn check(
 ) -> Result<(), Error> {
     for name in required {
         if !MODELLED.contains(&name.as_str()) && !TOLERATED.contains(&name.as_str()) {
-            return Err(Error::Extension {
-                file: file.into(),
-                extension: name.clone(),
-                remedy: remedy(name),
-            });
+            return Err(refusal(file, name));
         }
     }
     for name in used {
@@ -64,6 +60,11 @@ pub(super) fn check(
 /// Whether a material's use of `name` is modelled.
 pub(super) fn is_modelled(name: &str) -> bool {
     MODELLED.contains(&name)
+}
+
+/// The error for a file that cannot do without the extension `name`.
+pub(super) fn refusal(file: &Path, name: &str) -> Error {
+    Error::Extension { file: file.into(), extension: name.into(), remedy: remedy(name) }
 }
 
 fn remedy(name: &str) -> &'static str {

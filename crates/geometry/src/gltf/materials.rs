@@ -60,10 +60,11 @@ impl Reader<'_> {
             double_sided: json.double_sided,
             ..Material::default()
         };
-        for (channel, out) in
-            json.emissive_factor.0.into_iter().zip([&mut m.emissive.r, &mut m.emissive.g, &mut m.emissive.b])
-        {
-            *out = self.unit("emissiveFactor", channel)?;
+        m.emissive = self.color("emissiveFactor", json.emissive_factor.0)?;
+        if m.emissive.max_channel() > 1.0 {
+            // Old exporters wrote light levels here, and every viewer shows them: to clamp would put out lamps.
+            let text = "materials with an emissiveFactor above glTF's 1, kept as it is";
+            self.warnings.count(text, format!("\"{}\"", m.name), 1);
         }
         if let Some(normal) = &json.normal_texture {
             let transform = normal.extensions.as_ref().and_then(|e| e.others.get("KHR_texture_transform"));
@@ -91,7 +92,7 @@ impl Reader<'_> {
         m.unlit = e.unlit.is_some();
         if let Some(e) = &e.emissive_strength {
             let at = "extensions.KHR_materials_emissive_strength.emissiveStrength";
-            m.emissive = m.emissive * self.at_least(at, e.emissive_strength.0, 0.0)?;
+            m.emissive *= self.at_least(at, e.emissive_strength.0, 0.0)?;
         }
         if let Some(e) = &e.ior {
             // 0 is legal: a Fresnel term of 1.
@@ -142,7 +143,8 @@ impl Reader<'_> {
 
     fn warn_of_others(&mut self, name: &str, others: &Map<String, Value>) {
         for extension in others.keys().filter(|key| !extensions::is_modelled(key)) {
-            self.warnings.say(format!("material \"{name}\": {extension} is not modelled and is ignored"));
+            let text = format!("materials shown without {extension}, which is not modelled");
+            self.warnings.count(text, format!("\"{name}\""), 1);
         }
     }
 

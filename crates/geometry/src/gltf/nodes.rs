@@ -16,56 +16,95 @@ pub(super) struct Placed {
 }
 
 /// All nodes of the default scene, parents first.
-///
-/// Nodes must form trees (glTF 2.0, 3.5.3): one reached twice is an error, be it by a cycle or by two parents.
 pub(super) fn walk(document: &Document, warnings: &mut Warnings) -> Result<Vec<Placed>, Error> {
     let nodes = &document.root.nodes;
-    let mut visited = vec![false; nodes.len()];
+    let parents = parents(document)?;
+    let roots = roots(document, &parents, warnings)?;
     let mut placed = Vec::new();
-    let roots = roots(document, warnings)?;
     // A stack, not recursion: depth is the file's choice.
-    let mut stack: Vec<(usize, String, DAffine3, usize)> = Vec::new();
-    stack.extend(roots.into_iter().rev().map(|(i, at)| (i, at, DAffine3::IDENTITY, 1)));
-    while let Some((i, at, parent, depth)) = stack.pop() {
-        let node = nodes.get(i).ok_or_else(|| document.fault(&at, i, "there is no node of this number"))?;
-        if std::mem::replace(&mut visited[i], true) {
-            return Err(document.fault(&at, i, "this node is reached twice: a cycle, or two parents"));
-        }
-        document.within(&at, "generations of nodes", depth as u64, document.limits.node_depth as u64)?;
-        let world = parent * local(document, i, node)?;
+    let mut stack: Vec<(usize, DAffine3, usize)> = Vec::new();
+    stack.extend(roots.into_iter().rev().map(|i| (i, DAffine3::IDENTITY, 1)));
+    while let Some((i, parent, depth)) = stack.pop() {
+        let limit = document.limits.node_depth as u64;
+        document.within(format_args!("nodes[{i}]"), "generations of nodes", depth as u64, limit)?;
+        let world = parent * local(document, i, &nodes[i])?;
         placed.push(Placed { node: i, world });
-        for (k, child) in node.children.as_deref().unwrap_or_default().iter().enumerate().rev() {
-            stack.push((child.value(), format!("nodes[{i}].children[{k}]"), world, depth + 1));
-        }
+        let children = nodes[i].children.as_deref().unwrap_or_default();
+        stack.extend(children.iter().rev().map(|child| (child.value(), world, depth + 1)));
     }
     Ok(placed)
 }
 
-/// Root nodes with the paths that name them.
-fn roots(document: &Document, warnings: &mut Warnings) -> Result<Vec<(usize, String)>, Error> {
+/// The parent of each node. An error unless the nodes form trees (glTF 2.0, 3.5.3): with two parents and
+/// forty generations, one mesh could stand in 2⁴⁰ places.
+fn parents(document: &Document) -> Result<Vec<Option<usize>>, Error> {
+    let nodes = &document.root.nodes;
+    let mut parents = vec![None; nodes.len()];
+    for (i, node) in nodes.iter().enumerate() {
+        for (k, child) in node.children.iter().flatten().enumerate() {
+            let at = || format!("nodes[{i}].children[{k}]");
+            let c = child.value();
+            let parent = parents
+                .get_mut(c)
+                .ok_or_else(|| document.fault(at(), c, "there is no node of this number"))?;
+            if let Some(other) = parent.replace(i) {
+                return Err(document.fault(
+                    at(),
+                    c,
+                    format_args!("this node has another parent, nodes[{other}]"),
+                ));
+            }
+        }
+    }
+    // Where every node has at most one parent, going up either ends or runs in a circle.
+    const NEVER: usize = usize::MAX;
+    let mut seen_from = vec![NEVER; nodes.len()];
+    for start in 0..nodes.len() {
+        let mut next = Some(start);
+        while let Some(at) = next {
+            if seen_from[at] == start {
+                let problem = "nodes run in a circle";
+                return Err(document.fault(format_args!("nodes[{at}]"), "its own descendant", problem));
+            }
+            next = if seen_from[at] == NEVER { parents[at] } else { None };
+            seen_from[at] = seen_from[at].min(start);
+        }
+    }
+    Ok(parents)
+}
+
+/// The root nodes of the scene to show.
+fn roots(
+    document: &Document,
+    parents: &[Option<usize>],
+    warnings: &mut Warnings,
+) -> Result<Vec<usize>, Error> {
     let root = &document.root;
     let scene = root.scene.map_or(0, |scene| scene.value());
-    if let Some(chosen) = root.scenes.get(scene) {
-        if root.scene.is_none() && root.scenes.len() > 1 {
-            warnings.say(format!("no default scene among {}: the first is shown", root.scenes.len()));
+    let Some(chosen) = root.scenes.get(scene) else {
+        if root.scene.is_some() {
+            return Err(document.fault("scene", scene, "there is no scene of this number"));
         }
-        let list = chosen.nodes.iter().enumerate();
-        return Ok(list.map(|(k, node)| (node.value(), format!("scenes[{scene}].nodes[{k}]"))).collect());
-    }
-    if root.scene.is_some() {
-        return Err(document.fault("scene", scene, "there is no scene of this number"));
-    }
-    if root.nodes.is_empty() {
-        return Ok(Vec::new());
-    }
-    warnings.say("no scene: all root nodes are shown");
-    let mut is_child = vec![false; root.nodes.len()];
-    for child in root.nodes.iter().flat_map(|node| node.children.iter().flatten()) {
-        if let Some(slot) = is_child.get_mut(child.value()) {
-            *slot = true;
+        if !root.nodes.is_empty() {
+            warnings.say("no scene: all root nodes are shown");
         }
+        return Ok((0..root.nodes.len()).filter(|&i| parents[i].is_none()).collect());
+    };
+    if root.scene.is_none() && root.scenes.len() > 1 {
+        warnings.say(format!("no default scene among {}: the first is shown", root.scenes.len()));
     }
-    Ok((0..root.nodes.len()).filter(|&i| !is_child[i]).map(|i| (i, format!("nodes[{i}]"))).collect())
+    let mut listed = vec![false; root.nodes.len()];
+    for (k, node) in chosen.nodes.iter().enumerate() {
+        let i = node.value();
+        let problem = match parents.get(i) {
+            None => "there is no node of this number",
+            Some(Some(_)) => "this node is not a root: it has a parent",
+            Some(None) if std::mem::replace(&mut listed[i], true) => "this node is listed twice",
+            Some(None) => continue,
+        };
+        return Err(document.fault(format_args!("scenes[{scene}].nodes[{k}]"), i, problem));
+    }
+    Ok(chosen.nodes.iter().map(|node| node.value()).collect())
 }
 
 /// The node's own transform: its matrix, or translation · rotation · scale.
@@ -128,12 +167,19 @@ mod tests {
     #[test]
     fn cycles_shared_children_and_wrong_numbers_are_errors() {
         let errors = [
-            (r#""scenes":[{"nodes":[0]}],"nodes":[{"children":[0]}]"#, "nodes[0].children[0] = 0"),
+            (r#""scenes":[{"nodes":[0]}],"nodes":[{"children":[0]}]"#, "nodes[0] = its own descendant"),
             (
-                r#""scenes":[{"nodes":[0]}],"nodes":[{"children":[1]},{"children":[0]}]"#,
-                "nodes[1].children[0] = 0",
+                r#""nodes":[{},{"children":[2]},{"children":[3]},{"children":[1]}]"#,
+                "nodes[1] = its own descendant",
             ),
             (r#""scenes":[{"nodes":[0]}],"nodes":[{"children":[1,1]},{}]"#, "nodes[0].children[1] = 1"),
+            (
+                r#""scenes":[{"nodes":[0]}],"nodes":[{"children":[1]},{},{"children":[1]}]"#,
+                "nodes[2].children[0] = 1",
+            ),
+            (r#""scenes":[{"nodes":[0]}],"nodes":[{"children":[4]}]"#, "nodes[0].children[0] = 4"),
+            (r#""scenes":[{"nodes":[1]}],"nodes":[{"children":[1]},{}]"#, "scenes[0].nodes[0] = 1"),
+            (r#""scenes":[{"nodes":[0,0]}],"nodes":[{}]"#, "scenes[0].nodes[1] = 0"),
             (r#""scenes":[{"nodes":[5]}],"nodes":[{}]"#, "scenes[0].nodes[0] = 5"),
             (r#""scene":2,"scenes":[{"nodes":[0]}],"nodes":[{}]"#, "scene = 2"),
             (r#""scenes":[{"nodes":[0]}],"nodes":[{"scale":[1,1e39,1]}]"#, "nodes[0].scale = inf"),

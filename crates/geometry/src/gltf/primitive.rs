@@ -8,6 +8,7 @@ use gltf::json::validation::Checked;
 use super::accessor::Accessor;
 use super::document::Document;
 use super::error::Error;
+use super::extensions;
 use super::tangents;
 use super::topology;
 use crate::math::{Vec2, Vec3, Vec4};
@@ -49,6 +50,7 @@ impl Primitive {
         at: &str,
         needs: Needs,
     ) -> Result<Option<Primitive>, Error> {
+        refuse_compressed(document, primitive)?;
         let Some(positions) = attribute(document, primitive, at, Semantic::Positions, None)? else {
             return Err(document.fault(
                 format_args!("{at}.attributes.POSITION"),
@@ -89,9 +91,8 @@ impl Primitive {
         if needs.colors
             && let Some(accessor) = optional(Semantic::Colors(0))?
         {
-            // `max` and `min` also turn NaN into a number.
-            out.colors =
-                gather(&accessor, &source, |c: [f32; 4]| Vec4::from_array(c.map(|c| c.max(0.0).min(1.0))));
+            let channel = |c: f32| if c.is_nan() { 1.0 } else { c.clamp(0.0, 1.0) };
+            out.colors = gather(&accessor, &source, |c: [f32; 4]| Vec4::from_array(c.map(channel)));
         }
         if let Some(set) = needs.normal_map {
             // Without normals, tangents of the file must be ignored (glTF 2.0, 3.7.2.1).
@@ -123,6 +124,19 @@ impl Primitive {
         self.uvs.iter_mut().for_each(|set| push(set, v));
         (self.positions.len() - 1) as u32
     }
+}
+
+/// A file may call Draco optional and still have no data outside of it: the zeros that glTF then asks for
+/// would show nothing.
+fn refuse_compressed(document: &Document, primitive: &json::mesh::Primitive) -> Result<(), Error> {
+    let name = "KHR_draco_mesh_compression";
+    let compressed = primitive.extensions.as_ref().is_some_and(|e| e.others.contains_key(name));
+    let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+    let accessor = positions.and_then(|i| document.root.accessors.get(i.value()));
+    if compressed && accessor.is_some_and(|a| a.buffer_view.is_none() && a.sparse.is_none()) {
+        return Err(extensions::refusal(&document.file, name));
+    }
+    Ok(())
 }
 
 fn gather<const N: usize, T>(accessor: &Accessor, source: &[u32], make: impl Fn([f32; N]) -> T) -> Vec<T> {

@@ -16,17 +16,18 @@ pub(super) enum Target {
 pub(super) fn resolve(uri: &str) -> Result<Target, &'static str> {
     if let Some(data) = strip_prefix_ignore_case(uri, "data:") {
         let (head, body) = data.split_once(',').ok_or("a data URI without a comma")?;
-        if !head.to_ascii_lowercase().ends_with(";base64") {
-            return Err("a data URI that is not base64");
-        }
-        return base64(body.as_bytes()).map(Target::Bytes).ok_or("not valid base64");
+        return if head.to_ascii_lowercase().ends_with(";base64") {
+            base64(body.as_bytes()).map(Target::Bytes).ok_or("not valid base64")
+        } else {
+            Ok(Target::Bytes(percent_decode(body)))
+        };
     }
     if has_scheme(uri) {
         return Err("only relative paths and data URIs are read, no other scheme");
     }
     let raw = below(uri);
-    match percent_decode(uri) {
-        Some(name) if name != uri => below(&name).map(|path| Target::File(path, raw.ok())),
+    match String::from_utf8(percent_decode(uri)) {
+        Ok(name) if name != uri => below(&name).map(|path| Target::File(path, raw.ok())),
         _ => raw.map(|path| Target::File(path, None)),
     }
 }
@@ -49,8 +50,8 @@ fn has_scheme(uri: &str) -> bool {
         && head.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
 }
 
-/// `%41` to `A`; `None` when the result is not UTF-8. A `%` without two hex digits stays as it is.
-fn percent_decode(s: &str) -> Option<String> {
+/// `%41` to `A`. A `%` without two hex digits stays as it is.
+fn percent_decode(s: &str) -> Vec<u8> {
     let bytes = s.as_bytes();
     let hex = |i: usize| bytes.get(i).and_then(|&b| char::from(b).to_digit(16));
     let mut out = Vec::with_capacity(bytes.len());
@@ -67,7 +68,7 @@ fn percent_decode(s: &str) -> Option<String> {
             }
         }
     }
-    String::from_utf8(out).ok()
+    out
 }
 
 /// `name` as a path that cannot leave the folder. Backslashes count as slashes, as some exporters write them.
@@ -195,7 +196,7 @@ mod tests {
     #[test]
     fn data_uris_carry_bytes() {
         assert_eq!(resolve("data:application/octet-stream;base64,Zm9v"), Ok(Target::Bytes(b"foo".to_vec())));
-        assert!(resolve("data:text/plain,foo").is_err());
+        assert_eq!(resolve("data:text/plain,f%6F%FF"), Ok(Target::Bytes(b"fo\xFF".to_vec())));
         assert!(resolve("data:;base64").is_err());
     }
 
