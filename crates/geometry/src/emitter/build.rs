@@ -3,7 +3,7 @@
 use super::area::PolygonLight;
 use super::merge::polygons;
 use super::tree::{LightBounds, LightTree};
-use super::{EmitterKind, Emitters, NO_LIGHT, emission_at};
+use super::{EmitterKind, Emitters, NO_LIGHT, shone_at};
 use crate::math::Vec3;
 use crate::scene::{AlphaMode, Light, LightKind, Material};
 use crate::{Hit, Rgb, Scene, Sky};
@@ -127,7 +127,7 @@ fn mean_emission(scene: &Scene, triangle: u32) -> Rgb {
         for j in 0..n - i {
             let third = 1.0 / 3.0;
             let (u, v) = ((i as f32 + third) / n as f32, (j as f32 + third) / n as f32);
-            sum += emission_at(scene, &Hit { t: 0.0, triangle, u, v }, true);
+            sum += shone_at(scene, &Hit { t: 0.0, triangle, u, v }, true);
         }
     }
     sum / (n * (n + 1) / 2) as f32

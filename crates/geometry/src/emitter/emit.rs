@@ -1,7 +1,7 @@
 //! Light's own rays: photons that leave the lights, at random or toward what bends them.
 
 use super::area::PolygonLight;
-use super::{EmitterKind, Emitters, emission_at, hit_at, range_window, spot_falloff};
+use super::{EmitterKind, Emitters, hit_at, range_window, shone_at, spot_falloff};
 use crate::math::{Vec3, frame, offset_origin, to_world};
 use crate::scene::{Light, LightKind};
 use crate::{Ray, Rgb, Scene};
@@ -63,7 +63,7 @@ impl Emitters {
         let (ray, flux) = match kind {
             EmitterKind::Polygon(shape) => start.leave_polygon(shape, a, b, |_| shape.radiance)?,
             EmitterKind::Textured(shape) => start.leave_polygon(shape, a, b, |(point, d)| {
-                emission_at(scene, &hit_at(scene, shape.triangles[0], point, 0.0), d.dot(shape.normal) > 0.0)
+                shone_at(scene, &hit_at(scene, shape.triangles[0], point, 0.0), d.dot(shape.normal) > 0.0)
             })?,
             EmitterKind::Punctual(Light { intensity, kind, .. }) => match *kind {
                 LightKind::Directional { direction } => start.come_from_afar(direction, a, *intensity)?,

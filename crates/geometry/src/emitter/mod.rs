@@ -18,6 +18,7 @@ pub use punctual::{range_window, spot_falloff};
 
 use crate::math::{Vec3, offset_origin};
 use crate::scene::Light;
+use crate::surface::{coverage_at, emission_at};
 use crate::{Hit, Ray, Rgb, Scene, Sky};
 use std::f32::consts::PI;
 use tree::LightTree;
@@ -130,7 +131,7 @@ impl Emitters {
                 let distance = way.length();
                 let wi = way / distance;
                 let hit = hit_at(scene, shape.triangles[0], point, distance);
-                let radiance = emission_at(scene, &hit, wi.dot(shape.normal) < 0.0);
+                let radiance = shone_at(scene, &hit, wi.dot(shape.normal) < 0.0);
                 Some(LightSample { wi, distance, radiance, pdf, delta: false, light })
             }
             EmitterKind::Punctual(lamp) => {
@@ -178,8 +179,7 @@ fn hit_at(scene: &Scene, triangle: u32, point: Vec3, t: f32) -> Hit {
     Hit { t, triangle, u: u as f32, v: v.clamp(0.0, 1.0 - u) as f32 }
 }
 
-/// Emission of the material alone, until the shading model's own `emission_at` knows textures.
-fn emission_at(scene: &Scene, hit: &Hit, front: bool) -> Rgb {
-    let material = &scene.materials[scene.mesh.materials[hit.triangle as usize].0 as usize];
-    if front || material.double_sided { material.emissive } else { Rgb::BLACK }
+/// Radiance that one point of a triangle adds to a ray, cd/m²: what it emits, as far as alpha leaves it there.
+fn shone_at(scene: &Scene, hit: &Hit, front: bool) -> Rgb {
+    emission_at(scene, hit, front) * coverage_at(scene, hit)
 }
