@@ -5,6 +5,7 @@ pub mod error;
 pub mod exr;
 pub mod film;
 pub mod flip;
+pub mod integrator;
 pub mod metrics;
 pub mod output;
 pub mod render;

@@ -1,0 +1,325 @@
+//! The reference: a path tracer, unbiased but for a bound on the path's length, which never sees a radiosity solution.
+//!
+//! From the eye, at every surface one ray to a light and one by the material, weighed against each other (Veach and
+//! Guibas, "Optimally Combining Sampling Techniques for Monte Carlo Rendering", SIGGRAPH 1995), and Russian roulette
+//! (Arvo and Kirk, "Particle Transport and Image Synthesis", SIGGRAPH 1990).
+//!
+//! A window or a surface with alpha lets rays straight on. Such an event is no scattering: the density that a lamp
+//! found beyond is weighed by stays that of the last real one, and shadow rays pass the same panes.
+//!
+//! What it cannot find: light of point, spot and directional lamps by way of perfect mirrors or refraction, since no
+//! camera ray meets a lamp without extent.
+
+use super::{Layers, Seen};
+use crate::film::Pixel;
+use geometry::math::offset_origin;
+use geometry::optics::attenuation;
+use geometry::sampling::Rng;
+use geometry::{Camera, Ray, Rgb, Surface, Vec3, Volume, World};
+use std::f32::consts::PI;
+
+/// Scatterings after which a path ends whatever it carries. At ρ = 0.95 roulette leaves 2e-6 of the paths so long.
+pub const MAX_BOUNCES: u32 = 256;
+
+/// Straight passages after which a path ends: alpha cards in a row.
+const MAX_STRAIGHT: u32 = 1024;
+
+/// Roulette spares the first bounces, which carry most of the light.
+const ROULETTE_FROM: u32 = 5;
+
+/// Radiance that arrives along `ray`, one unbiased sample, and what the ray met first.
+pub fn radiance(world: &World, ray: Ray, rng: &mut Rng) -> (Layers, Option<Seen>) {
+    Path::new(world, ray, true).trace(rng)
+}
+
+/// Mean of `spp` paths through random points of pixel (x, y), from the top left; the filter is the pixel's box.
+///
+/// The numbers drawn depend on `seed`, the pixel and the sample alone. The variance is that of the mean's luminance,
+/// from the spread of the samples; zero for a single one.
+pub fn render_pixel(
+    world: &World,
+    camera: &Camera,
+    (width, height): (u32, u32),
+    (x, y): (u32, u32),
+    spp: u32,
+    seed: u64,
+) -> Pixel {
+    let aspect = width as f32 / height as f32;
+    let mut pixel = Pixel { samples: spp, ..Pixel::default() };
+    let (mut mean, mut spread, mut met) = (0f64, 0f64, 0u32);
+    // Sums over thousands of samples in f64 would cost twelve more words; the running mean keeps f32 honest.
+    for i in 0..spp {
+        let index = (u64::from(y) * u64::from(width) + u64::from(x)) << 32 | u64::from(i);
+        let mut rng = Rng::new(seed, index);
+        let (u, v) = ((x as f32 + rng.f32()) / width as f32, (y as f32 + rng.f32()) / height as f32);
+        let (layers, seen) = radiance(world, camera.ray(u, v, aspect), &mut rng);
+        let share = 1.0 / (i + 1) as f32;
+        pixel.direct = pixel.direct.lerp(layers.direct, share);
+        pixel.indirect = pixel.indirect.lerp(layers.indirect, share);
+        pixel.specular = pixel.specular.lerp(layers.specular, share);
+        pixel.emission = pixel.emission.lerp(layers.emission, share);
+        if let Some(seen) = seen {
+            met += 1;
+            let share = 1.0 / met as f32;
+            pixel.albedo = pixel.albedo.lerp(seen.albedo, share);
+            pixel.normal = pixel.normal.lerp(seen.normal, share);
+            pixel.position = pixel.position.lerp(seen.position, share);
+            pixel.depth += (seen.depth - pixel.depth) * share;
+        }
+        let luminance = f64::from(layers.total().luminance());
+        let step = luminance - mean;
+        mean += step / f64::from(i + 1);
+        spread += step * (luminance - mean);
+    }
+    if spp > 1 {
+        pixel.variance = (spread / (f64::from(spp) * f64::from(spp - 1))) as f32;
+    }
+    pixel.alpha = met as f32 / spp.max(1) as f32;
+    let light = (pixel.direct + pixel.indirect) * PI;
+    let per = |light: f32, albedo: f32| if albedo > 0.0 { light / albedo } else { 0.0 };
+    pixel.irradiance =
+        Rgb::new(per(light.r, pixel.albedo.r), per(light.g, pixel.albedo.g), per(light.b, pixel.albedo.b));
+    pixel
+}
+
+/// The last real scattering, for weighing what its ray meets against a shadow ray from the same place.
+struct Scattering {
+    position: Vec3,
+    /// The normal the light was chosen by; zero for none.
+    preference: Vec3,
+    /// 1/sr; `None` after a perfect mirror or glass, whose light no shadow ray finds.
+    pdf: Option<f32>,
+}
+
+/// A path in the making.
+struct Path<'a> {
+    world: &'a World,
+    ray: Ray,
+    /// Whether shadow rays are sent; without them only rays that meet lamps count, as a check on the weights.
+    light_sampling: bool,
+    layers: Layers,
+    seen: Option<Seen>,
+    /// Radiance at the eye per radiance found.
+    throughput: Rgb,
+    /// Of it, the share that went through the diffuse lobe at the first surface.
+    diffuse_first: Rgb,
+    /// Of it, the share that went through no diffuse lobe at all.
+    never_diffuse: Rgb,
+    bounces: u32,
+    last: Option<Scattering>,
+    medium: Option<Volume>,
+}
+
+impl<'a> Path<'a> {
+    fn new(world: &'a World, ray: Ray, light_sampling: bool) -> Path<'a> {
+        Path {
+            world,
+            ray,
+            light_sampling,
+            layers: Layers::default(),
+            seen: None,
+            throughput: Rgb::WHITE,
+            diffuse_first: Rgb::BLACK,
+            never_diffuse: Rgb::WHITE,
+            bounces: 0,
+            last: None,
+            medium: None,
+        }
+    }
+
+    fn trace(mut self, rng: &mut Rng) -> (Layers, Option<Seen>) {
+        let mut straight = 0;
+        while self.bounces <= MAX_BOUNCES && straight <= MAX_STRAIGHT {
+            let Some(hit) = self.world.closest(&self.ray) else {
+                self.escape();
+                break;
+            };
+            let surface = Surface::new(&self.world.scene, &self.ray, &hit);
+            if let Some(medium) = surface.interior().or(self.medium) {
+                let way = hit.t - self.ray.t_min;
+                self.throughput *= attenuation(medium.attenuation_color, medium.attenuation_distance, way);
+            }
+            if surface.coverage < 1.0 && rng.f32() >= surface.coverage {
+                self.ray.t_min = hit.t;
+                straight += 1;
+                continue;
+            }
+            if let Some(color) = surface.unlit {
+                self.look(&surface, hit.t);
+                self.show(color);
+                break;
+            }
+            self.emission(&surface);
+            let Some(goes_straight) = self.scatter(&surface, hit.t, rng) else { break };
+            if goes_straight {
+                straight += 1;
+                continue;
+            }
+            self.bounces += 1;
+            if self.bounces >= ROULETTE_FROM && !self.survives(rng) {
+                break;
+            }
+        }
+        (self.layers, self.seen)
+    }
+
+    /// Light found: to the layer that the path so far belongs to. `weight` by the share of other ways to find it.
+    fn add(&mut self, radiance: Rgb, weight: f32) {
+        let light = self.throughput * radiance * weight;
+        match self.bounces {
+            0 => self.layers.emission += light,
+            bounces => self.add_split(light, self.diffuse_first, bounces),
+        }
+    }
+
+    /// Light that came over `bounces` ≥ 1 surfaces; `diffuse`: its share by the first surface's diffuse lobe.
+    fn add_split(&mut self, light: Rgb, diffuse: Rgb, bounces: u32) {
+        let by_diffuse = light * diffuse;
+        if bounces == 1 {
+            self.layers.direct += by_diffuse;
+        } else {
+            self.layers.indirect += by_diffuse;
+        }
+        self.layers.specular += light - by_diffuse;
+    }
+
+    /// An unlit colour: seen directly or in mirrors and gloss, but it lights nothing.
+    fn show(&mut self, color: Rgb) {
+        let light = self.throughput * self.never_diffuse * color;
+        match self.bounces {
+            0 => self.layers.emission += light,
+            _ => self.layers.specular += light,
+        }
+    }
+
+    /// Weight of a lamp met by itself, when a shadow ray would have drawn it with density `pdf_light`.
+    fn weight(&self, pdf_light: impl Fn(Vec3, Vec3) -> f32) -> f32 {
+        match &self.last {
+            Some(Scattering { position, preference, pdf: Some(pdf) }) if self.light_sampling => {
+                power_heuristic(*pdf, pdf_light(*position, *preference))
+            }
+            _ => 1.0,
+        }
+    }
+
+    fn escape(&mut self) {
+        if let Some(sky) = &self.world.scene.sky {
+            let d = self.ray.direction;
+            let weight = self.weight(|_, n| self.world.emitters.pdf_sky(n, d));
+            self.add(sky.radiance(d), weight);
+        }
+    }
+
+    fn emission(&mut self, surface: &Surface) {
+        if surface.emission.is_black() {
+            return;
+        }
+        let weight =
+            self.weight(|p, n| self.world.emitters.pdf_triangle(p, n, surface.triangle, surface.position));
+        self.add(surface.emission, weight);
+    }
+
+    /// Lights the surface by a shadow ray and sends the path on; whether straight. `None` where it is absorbed.
+    fn scatter(&mut self, surface: &Surface, t: f32, rng: &mut Rng) -> Option<bool> {
+        let bsdf = &surface.bsdf;
+        let wo = -self.ray.direction;
+        let sample = bsdf.sample(wo, rng.array());
+        // A rough pane is lit from both sides.
+        let rough = !bsdf.is_delta();
+        let preference =
+            if rough && !bsdf.layers.transmission(1.0).is_black() { Vec3::ZERO } else { surface.ns };
+        let goes_straight = sample.is_some_and(|s| s.straight);
+        if !goes_straight {
+            self.look(surface, t);
+        }
+        // Drawn whether the path goes straight on or not: the lobes that scatter are lit by every path alike.
+        if self.light_sampling && (rough || bsdf.has_diffuse()) {
+            self.next_event(surface, wo, preference, rng);
+        }
+        let s = sample?;
+        self.throughput *= s.weight;
+        if s.wi.dot(surface.ng) < 0.0 {
+            self.medium = surface.beyond();
+        }
+        if s.straight {
+            self.ray.t_min = t;
+            return Some(true);
+        }
+        if s.delta {
+            if self.bounces == 0 {
+                self.diffuse_first = Rgb::BLACK;
+            }
+        } else {
+            let diffuse = share(bsdf.eval_diffuse(wo, s.wi), bsdf.eval(wo, s.wi));
+            if self.bounces == 0 {
+                self.diffuse_first = diffuse;
+            }
+            self.never_diffuse *= Rgb::WHITE - diffuse;
+        }
+        let side = if s.wi.dot(surface.ng) < 0.0 { -surface.ng } else { surface.ng };
+        self.ray = Ray::new(offset_origin(surface.position, side), s.wi);
+        let pdf = (!s.delta).then_some(s.pdf);
+        self.last = Some(Scattering { position: surface.position, preference, pdf });
+        Some(false)
+    }
+
+    /// One shadow ray.
+    fn next_event(&mut self, surface: &Surface, wo: Vec3, preference: Vec3, rng: &mut Rng) {
+        let World { scene, emitters, .. } = self.world;
+        let u = rng.array();
+        let Some(light) = emitters.sample(scene, surface.position, preference, u) else { return };
+        let (diffuse, glossy) =
+            (surface.bsdf.eval_diffuse(wo, light.wi), surface.bsdf.eval_glossy(wo, light.wi));
+        let f = diffuse + glossy;
+        if f.is_black() {
+            return;
+        }
+        let left = self.world.transmittance(&light.shadow_ray(surface.position, surface.ng));
+        if left.is_black() {
+            return;
+        }
+        let weight = match light.delta {
+            true => 1.0,
+            false => power_heuristic(light.pdf, surface.bsdf.pdf(wo, light.wi)),
+        };
+        let cos = light.wi.dot(surface.ns).abs();
+        let found = self.throughput * f * left * light.radiance * (weight * cos / light.pdf);
+        let by_diffuse = if self.bounces == 0 { share(diffuse, f) } else { self.diffuse_first };
+        self.add_split(found, by_diffuse, self.bounces + 1);
+    }
+
+    /// Notes the first surface that did not let the ray straight on.
+    fn look(&mut self, surface: &Surface, t: f32) {
+        if self.bounces == 0 && self.seen.is_none() {
+            let albedo = surface.unlit.unwrap_or_else(|| surface.bsdf.diffuse_albedo(-self.ray.direction));
+            let (normal, position) = (surface.ns, surface.position);
+            self.seen = Some(Seen { albedo, normal, position, depth: t });
+        }
+    }
+
+    /// Ends dim paths by chance, and makes up for it in those that live.
+    fn survives(&mut self, rng: &mut Rng) -> bool {
+        let chance = self.throughput.max_channel().min(1.0);
+        if rng.f32() >= chance {
+            return false;
+        }
+        self.throughput *= 1.0 / chance;
+        true
+    }
+}
+
+/// Weight of a sample drawn with density `own` where another way would have had `other` (Veach 1997, sec. 9.2.3).
+fn power_heuristic(own: f32, other: f32) -> f32 {
+    // By the ratio: squares of large densities overflow.
+    let r = other / own;
+    1.0 / (1.0 + r * r)
+}
+
+/// `part` / `whole` by channel, 0 of nothing.
+fn share(part: Rgb, whole: Rgb) -> Rgb {
+    let of = |part: f32, whole: f32| if whole > 0.0 { (part / whole).min(1.0) } else { 0.0 };
+    Rgb::new(of(part.r, whole.r), of(part.g, whole.g), of(part.b, whole.b))
+}
+
+#[cfg(test)]
+mod tests;
