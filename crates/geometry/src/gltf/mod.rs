@@ -101,6 +101,9 @@ fn import(path: &Path, limits: &Limits) -> Result<Loaded, Error> {
     let root = &document.root;
     extensions::check(path, &root.extensions_used, &root.extensions_required, &mut warnings)?;
     let mut scene = Scene { materials: materials::read_all(&document, &mut warnings)?, ..Scene::default() };
+    if !root.animations.is_empty() {
+        warnings.say("animations are not modelled: everything stands in its rest pose");
+    }
     let placed = nodes::walk(&document, &mut warnings)?;
     let mut cameras = Vec::new();
     for node in &placed {
@@ -188,7 +191,12 @@ fn build(
 ) -> Result<(u64, u64), Error> {
     let root = &document.root;
     let used = || root.meshes.iter().zip(uses).enumerate().filter(|(_, (_, u))| !u.places.is_empty());
-    let layout = layout(scene, used().flat_map(|(_, (mesh, _))| &mesh.primitives));
+    let uv_sets: Vec<[bool; 2]> = scene.materials.iter_mut().map(uv_sets).collect();
+    let layout = Layout {
+        uvs: [0, 1].map(|set| uv_sets.iter().any(|sets| sets[set])),
+        colors: used().any(|(_, (mesh, _))| mesh.primitives.iter().any(has_colors)),
+        tangents: scene.materials.iter().any(|m| m.normal_texture.is_some()),
+    };
     // Corners must be countable in 32 bits.
     let limit = document.limits.triangles.min(u64::from(u32::MAX) / 3);
     let (mut instances, mut triangles) = (0, 0);
@@ -212,11 +220,15 @@ fn build(
                 }),
             };
             let normal_map = scene.materials[material.0 as usize].normal_texture.map(|t| t.uv_set);
-            let needs = Needs { uvs: layout.uvs, colors: layout.colors, normal_map };
+            let uvs = uv_sets.get(material.0 as usize).copied().unwrap_or_default();
+            let needs = Needs { uvs, colors: layout.colors, normal_map };
             let Some(primitive) = Primitive::read(document, json, &at, needs)? else {
                 warnings.count("points and lines are left out", &at, 1);
                 continue;
             };
+            if [0, 1].into_iter().any(|set| uvs[set] && primitive.uvs[set].is_empty()) {
+                warnings.count("primitives lack a TEXCOORD that their textures need: taken as 0", &at, 1);
+            }
             triangles += primitive.triangles.len() as u64 * uses.places.len() as u64;
             document.within(&at, "triangles", triangles, limit)?;
             for (node, world) in &uses.places {
@@ -229,13 +241,15 @@ fn build(
     Ok((instances, triangles))
 }
 
-/// The optional arrays that any material or primitive of the scene can make use of.
-fn layout<'a>(scene: &mut Scene, mut primitives: impl Iterator<Item = &'a json::mesh::Primitive>) -> Layout {
-    let mut layout = Layout::default();
-    for texture in scene.materials.iter_mut().flat_map(materials::texture_refs).flatten() {
-        layout.uvs[usize::from(texture.uv_set.min(1))] = true;
+/// Which uv sets the textures of a material use.
+fn uv_sets(material: &mut Material) -> [bool; 2] {
+    let mut sets = [false; 2];
+    for texture in materials::texture_refs(material).into_iter().flatten() {
+        sets[usize::from(texture.uv_set.min(1))] = true;
     }
-    layout.tangents = scene.materials.iter().any(|m| m.normal_texture.is_some());
-    layout.colors = primitives.any(|p| p.attributes.contains_key(&Checked::Valid(Semantic::Colors(0))));
-    layout
+    sets
+}
+
+fn has_colors(primitive: &json::mesh::Primitive) -> bool {
+    primitive.attributes.contains_key(&Checked::Valid(Semantic::Colors(0)))
 }

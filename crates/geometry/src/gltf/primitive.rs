@@ -16,7 +16,7 @@ use crate::math::{Vec2, Vec3, Vec4};
 /// Which optional attributes the scene can make use of.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Needs {
-    /// Each uv set that a texture refers to.
+    /// Each uv set that a texture of this primitive's material refers to.
     pub uvs: [bool; 2],
     /// Vertex colours.
     pub colors: bool,

@@ -167,8 +167,8 @@ struct Source {
     name: String,
     bytes: Vec<u8>,
     sampler: Sampler,
-    /// Empty, or why it shall not be decoded (said already).
-    refused: bool,
+    /// Columns times rows; none when it shall not be decoded, for a reason already said.
+    pixels: Option<u64>,
 }
 
 impl Source {
@@ -192,7 +192,7 @@ impl Source {
             (None, None) => Err(document.fault(&at, "{}", "it has neither uri nor bufferView")),
         };
         match bytes {
-            Ok(bytes) => Ok(Some(Source { name, bytes, sampler, refused: false })),
+            Ok(bytes) => Ok(Some(Source { name, bytes, sampler, pixels: None })),
             Err(limit @ Error::Limit { .. }) => Err(limit),
             Err(e) => {
                 warnings.say(format!("image \"{name}\" is left out: {}", chain(&e)));
@@ -209,12 +209,14 @@ impl Source {
     }
 
     fn decode(self) -> Result<Texture, String> {
-        if self.refused {
-            return Err(String::new());
-        }
+        let Some(pixels) = self.pixels else { return Err(String::new()) };
         let failed = |e: &dyn std::fmt::Display| format!("image \"{}\" is left out: {e}", self.name);
-        let reader =
-            ImageReader::new(Cursor::new(&self.bytes)).with_guessed_format().map_err(|e| failed(&e))?;
+        let reader = ImageReader::new(Cursor::new(&self.bytes)).with_guessed_format();
+        let mut reader = reader.map_err(|e| failed(&e))?;
+        // The size has been judged; what is left is room for its texels, at most 4 × 32 bits, and some more.
+        let mut limits = image::Limits::default();
+        limits.max_alloc = Some(16 * pixels + (64 << 20));
+        reader.limits(limits);
         let rgba = reader.decode().map_err(|e| failed(&e))?.into_rgba8();
         let (width, height) = rgba.dimensions();
         let texels = rgba.as_raw().as_chunks::<4>().0.to_vec();
@@ -237,26 +239,21 @@ fn measure(sources: &mut [Source], limits: &Limits, warnings: &mut Warnings) {
     let mut total = 0u64;
     for source in sources {
         let problem = match source.size() {
-            Err(e) => Some(e),
+            Err(e) => e,
             Ok((w, h)) => {
                 let pixels = u64::from(w) * u64::from(h);
                 if pixels > limits.image_pixels {
-                    Some(format!("{w} × {h} pixels are more than the limit of {}", limits.image_pixels))
+                    format!("{w} × {h} pixels are more than the limit of {}", limits.image_pixels)
                 } else if total.saturating_add(pixels) > limits.total_pixels {
-                    Some(format!(
-                        "all images together have more pixels than the limit of {}",
-                        limits.total_pixels
-                    ))
+                    format!("all images together have more pixels than the limit of {}", limits.total_pixels)
                 } else {
                     total += pixels;
-                    None
+                    source.pixels = Some(pixels);
+                    continue;
                 }
             }
         };
-        if let Some(problem) = problem {
-            warnings.say(format!("image \"{}\" is left out: {problem}", source.name));
-            source.refused = true;
-        }
+        warnings.say(format!("image \"{}\" is left out: {problem}", source.name));
     }
 }
 
