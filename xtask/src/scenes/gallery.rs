@@ -1,9 +1,9 @@
 //! A furnished room at dusk, and a second one lit only through the door between them.
 //!
-//! The room holds what the renderer is for: diffuse walls and textures, area lamps, a spot, a sky in a window of
-//! thin glass, a mirror, a table of solid glass, rough metal, glazed ceramics, a sculpture of many triangles. And it
-//! holds what breaks radiosity: one floor slab under all walls, furniture that pierces every coarse mesh, books
-//! that touch, a picture rail's worth of narrow gaps, a doorway through which all light of the second room comes.
+//! It holds what the renderer is for: diffuse walls and textures, area lamps, a spot, a sky in a window of thin
+//! glass, a mirror, a table of solid glass, rough metal, glazed ceramics, a sculpture of many triangles. And it holds
+//! what breaks radiosity: one floor slab under all walls, furniture that pierces every coarse mesh, books that touch,
+//! millimetres of air below a vase, a room whose only light comes through a door.
 //!
 //! Room A: x from 0 to 8, z from 0 to 5. Room B: x from 8.2 to 13.2, same z. Both 3 m high.
 

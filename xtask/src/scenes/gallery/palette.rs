@@ -4,7 +4,8 @@ use crate::scenes::document::{Document, MaterialId};
 use crate::scenes::material::{Material, Volume};
 use crate::scenes::paint;
 
-/// Every material of the gallery. Albedos of what is large lie between 0.2 and 0.8, as in real rooms.
+/// Every material of the gallery, each named for what it is. Albedos of large surfaces lie between 0.2 and 0.8, as in
+/// real rooms.
 pub struct Palette {
     pub white: MaterialId,
     pub plaster: MaterialId,
@@ -70,7 +71,7 @@ impl Palette {
         ];
 
         let dielectric = |roughness, lambert| Material { roughness, specular: 1.0, ..lambert };
-        // The top of the attenuation scale of soda-lime glass: 12 mm look clear, an edge looks green.
+        // Soda-lime glass with a trace of iron: clear through the plate, green along it.
         let green = Volume {
             thickness: 0.012,
             attenuation_color: [0.62, 0.85, 0.75],
