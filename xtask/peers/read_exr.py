@@ -19,7 +19,7 @@ WANTED += [f"{layer}.{c}" for layer in VECTORS for c in "XYZ"]
 
 def main(path):
     with OpenEXR.File(path, separate_channels=True) as file:
-        header = file.header()
+        header = set(file.header())  # the file takes its own along when it closes
         channels = {name: np.asarray(c.pixels, np.float64) for name, c in file.channels().items()}
     missing = [name for name in WANTED if name not in channels]
     assert not missing, f"missing channels {missing}; there are {sorted(channels)}"
