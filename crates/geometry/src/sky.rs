@@ -1,7 +1,7 @@
 //! Light from beyond all triangles: one colour, or an image around the scene.
 
-use crate::Rgb;
-use crate::math::Vec3;
+use crate::math::{Vec2, Vec3};
+use crate::{Rgb, sampling};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 /// Radiance by direction, cd/m². +y is up.
@@ -68,10 +68,8 @@ impl Sky {
     pub fn sample(&self, u: [f32; 2]) -> SkySample {
         match self {
             Sky::Constant(l) => {
-                let z = 1.0 - 2.0 * u[0];
-                let r = (1.0 - z * z).max(0.0).sqrt();
-                let (sin, cos) = (TAU * u[1]).sin_cos();
-                SkySample { direction: Vec3::new(r * cos, z, r * sin), radiance: *l, pdf: 0.25 * FRAC_1_PI }
+                let direction = sampling::sphere(Vec2::from(u));
+                SkySample { direction, radiance: *l, pdf: sampling::sphere_pdf_solid_angle() }
             }
             Sky::Image(image) => image.sample(u),
         }
@@ -80,7 +78,7 @@ impl Sky {
     /// The density with which [`Sky::sample`] gives the unit direction `d`, 1/sr.
     pub fn pdf(&self, d: Vec3) -> f32 {
         match self {
-            Sky::Constant(_) => 0.25 * FRAC_1_PI,
+            Sky::Constant(_) => sampling::sphere_pdf_solid_angle(),
             Sky::Image(image) => image.pdf(d),
         }
     }

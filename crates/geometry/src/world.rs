@@ -80,3 +80,70 @@ impl World {
 fn over(medium: Option<Volume>, way: f32) -> Rgb {
     medium.map_or(Rgb::WHITE, |m| attenuation(m.attenuation_color, m.attenuation_distance, way))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{AlphaMode, Material, MaterialId, Mesh};
+
+    /// Squares of 2 m across the y axis, one for each (height, front up, material).
+    fn stack(layers: Vec<(f32, bool, Material)>) -> World {
+        let mut mesh = Mesh::default();
+        let mut materials = Vec::new();
+        for (i, (y, up, material)) in layers.into_iter().enumerate() {
+            let s = if up { 1.0 } else { -1.0 };
+            mesh.positions
+                .extend([[-s, 1.0], [s, 1.0], [s, -1.0], [-s, -1.0]].map(|[x, z]| Vec3::new(x, y, z)));
+            let a = 4 * i as u32;
+            mesh.triangles.extend([[a, a + 1, a + 2], [a, a + 2, a + 3]]);
+            mesh.materials.extend([MaterialId(i as u32); 2]);
+            materials.push(material);
+        }
+        World::new(Scene { mesh, materials, ..Scene::default() })
+    }
+
+    fn veil() -> Material {
+        Material { alpha: 0.25, alpha_mode: AlphaMode::Blend, ..Material::default() }
+    }
+
+    fn clear(attenuation_distance: f32) -> Material {
+        let volume = Some(Volume { attenuation_color: Rgb::splat(0.5), attenuation_distance });
+        Material { metallic: 0.0, roughness: 0.0, transmission: 1.0, ior: 1.0, volume, ..Material::default() }
+    }
+
+    fn down(from: f32, to: f32) -> Ray {
+        Ray { t_max: from - to, ..Ray::new(Vec3::new(0.1, from, 0.2), Vec3::NEG_Y) }
+    }
+
+    #[test]
+    fn opaque_is_black_and_nothing_is_white() {
+        let world = stack(vec![(0.0, true, Material::default())]);
+        assert_eq!(world.transmittance(&down(1.0, -1.0)), Rgb::BLACK);
+        assert_eq!(world.transmittance(&down(1.0, 0.5)), Rgb::WHITE);
+        assert_eq!((world.diagonal, world.bounds.1), (8f32.sqrt(), Vec3::new(1.0, 0.0, 1.0)));
+    }
+
+    #[test]
+    fn veils_multiply_until_something_opaque() {
+        let world = stack(vec![(0.0, true, veil()), (0.5, false, veil()), (-1.0, true, Material::default())]);
+        assert!((world.transmittance(&down(1.0, -0.5)).g - 0.5625).abs() < 1e-6);
+        assert_eq!(world.transmittance(&down(1.0, -2.0)), Rgb::BLACK);
+        let many = stack((0..200).map(|i| (i as f32 * 0.01, true, veil())).collect());
+        assert_eq!(many.transmittance(&down(3.0, -1.0)), Rgb::BLACK, "given up");
+    }
+
+    #[test]
+    fn a_medium_absorbs_by_the_way_in_it() {
+        let world = stack(vec![(1.0, true, clear(0.5)), (0.0, false, clear(0.5))]);
+        // 1 m in all; from within upward or downward ½ m; from above to a lamp within ½ m.
+        for (ray, left) in [
+            (down(2.0, -1.0), 0.25),
+            (down(0.5, -1.0), 0.5),
+            (down(2.0, 0.5), 0.5),
+            (Ray { direction: Vec3::Y, ..down(0.5, -1.0) }, 0.5),
+        ] {
+            let got = world.transmittance(&ray).g;
+            assert!((got - left).abs() < 1e-5, "{ray:?}: {got}");
+        }
+    }
+}

@@ -2,9 +2,10 @@
 
 use super::spherical::SphericalTriangle;
 use crate::Rgb;
-use crate::math::{Vec3, frame};
+use crate::math::{Vec2, Vec3, to_world};
 use crate::polygon::polygon_irradiance;
-use std::f32::consts::{PI, TAU};
+use crate::sampling;
+use std::f32::consts::PI;
 
 /// A plane convex polygon that shines with one radiance, or one triangle whose texture shines unevenly.
 #[derive(Clone, Debug)]
@@ -103,9 +104,8 @@ impl PolygonLight {
             let (b, c) = (self.vertices[i], self.vertices[i + 1]);
             let area = crate::triangle::area(first, b, c);
             if left < area || i == last {
-                // Square to triangle: Turk, "Generating Random Points in Triangles", Graphics Gems, 1990.
-                let root = (left / area).clamp(0.0, 1.0).sqrt();
-                return first * (1.0 - root) + b * (root * (1.0 - u[1])) + c * (root * u[1]);
+                let (v, w) = sampling::triangle(Vec2::new((left / area).clamp(0.0, 1.0), u[1]));
+                return first + (b - first) * v + (c - first) * w;
             }
             left -= area;
         }
@@ -120,10 +120,7 @@ impl PolygonLight {
             (true, true) => (-1.0, 2.0 * u[0]),
             (true, false) => (1.0, 2.0 * u[0] - 1.0),
         };
-        let (s, t) = frame(self.normal);
-        let (sin, cos) = (TAU * u[1]).sin_cos();
-        let r = u0.sqrt();
-        (s * cos + t * sin) * r + self.normal * (side * (1.0 - u0).max(0.0).sqrt())
+        to_world(sampling::cosine_hemisphere(Vec2::new(u0, u[1])), self.normal * side)
     }
 
     /// Density over solid angle of a point drawn evenly in area, d² / (A cos); `None` edge-on.

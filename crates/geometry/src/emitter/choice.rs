@@ -1,9 +1,8 @@
 //! Which light for which point, and how likely: the density of the whole draw.
 
 use super::{EmitterKind, Emitters, LightSample};
-use crate::math::{Vec3, to_world};
-use crate::{Scene, Sky};
-use std::f32::consts::{FRAC_1_PI, TAU};
+use crate::math::{Vec2, Vec3, to_world};
+use crate::{Scene, Sky, sampling};
 
 impl Emitters {
     /// One way to one light for the point `p`; `None` when the draw meets a light that sends nothing there.
@@ -16,10 +15,8 @@ impl Emitters {
         let u = [u[1], u[2]];
         let s = match (&self.lights[light as usize], n != Vec3::ZERO) {
             (EmitterKind::Sky(Sky::Constant(radiance)), true) => {
-                let (sin, cos) = (TAU * u[1]).sin_cos();
-                let (r, z) = (u[0].sqrt(), (1.0 - u[0]).sqrt());
-                let wi = to_world(Vec3::new(r * cos, r * sin, z), n);
-                let pdf = wi.dot(n) * FRAC_1_PI;
+                let wi = to_world(sampling::cosine_hemisphere(Vec2::from(u)), n);
+                let pdf = sampling::cosine_hemisphere_pdf_solid_angle(wi.dot(n));
                 (pdf > 0.0).then_some(LightSample {
                     wi,
                     distance: f32::INFINITY,
@@ -52,7 +49,7 @@ impl Emitters {
         // The sky, when there is one, is the last light.
         match (self.lights.last(), self.far.last()) {
             (Some(EmitterKind::Sky(Sky::Constant(_))), Some((_, share))) if n != Vec3::ZERO => {
-                share * wi.dot(n).max(0.0) * FRAC_1_PI
+                share * sampling::cosine_hemisphere_pdf_solid_angle(wi.dot(n))
             }
             (Some(EmitterKind::Sky(sky)), Some((_, share))) => share * sky.pdf(wi),
             _ => 0.0,
@@ -81,9 +78,11 @@ impl Emitters {
 mod tests {
     use super::*;
     use crate::emitter::testing::*;
+    use crate::math::Affine2;
     use crate::polygon::polygon_irradiance;
     use crate::scene::{Light, LightKind};
-    use crate::{Mesh, Rgb};
+    use crate::texture::Wrap;
+    use crate::{Mesh, Rgb, Texture, TextureRef};
     use std::f32::consts::PI;
 
     /// Unshadowed irradiance by quasi-random draws; each carries the density that is told of it.
@@ -153,5 +152,37 @@ mod tests {
         let scene = Scene { sky: Some(Sky::Constant(Rgb::splat(2.0))), ..Scene::default() };
         assert!((irradiance(&scene, Vec3::ZERO, Vec3::Y) / (2.0 * PI) - 1.0).abs() < 1e-4);
         assert!(Emitters::build(&Scene::default()).is_empty());
+    }
+
+    /// A lamp whose texture is black but for one half: its mean and each sample are the texture's.
+    #[test]
+    fn a_textured_lamp_shines_where_its_texture_does() {
+        let mut scene = scene_of(quad(), 4.0);
+        let texture = |texels: Vec<[u8; 4]>| Texture {
+            name: String::new(),
+            width: texels.len() as u32,
+            height: 1,
+            texels,
+            wrap_s: Wrap::ClampToEdge,
+            wrap_t: Wrap::ClampToEdge,
+            linear: false,
+        };
+        scene.textures = vec![texture(vec![[255; 4], [0, 0, 0, 255]])];
+        scene.mesh.uvs[0] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Vec2::from).to_vec();
+        let transform = Affine2::IDENTITY;
+        scene.materials[0].emissive_texture = Some(TextureRef { texture: 0, uv_set: 0, transform });
+        let emitters = Emitters::build(&scene);
+        assert_eq!(emitters.len(), 2);
+        let flux: f32 = emitters.power().iter().map(|p| p.g).sum();
+        assert!((flux / (PI * 4.0 * 0.5) - 1.0).abs() < 0.03, "{flux}");
+        let c = &scene.mesh.positions;
+        let bright = [c[0], 0.5 * (c[0] + c[1]), 0.5 * (c[2] + c[3]), c[3]];
+        let exact = 4.0 * PI * polygon_irradiance(Vec3::ZERO, Vec3::Y, &bright);
+        let k = 50_000;
+        let draw = |u: [f32; 6]| emitters.sample(&scene, Vec3::ZERO, Vec3::Y, [u[0], u[1], u[2]]);
+        let e: f64 = points(k).filter_map(draw).map(|s| (s.radiance.g * s.wi.y / s.pdf) as f64).sum();
+        assert!((e as f32 / k as f32 / exact - 1.0).abs() < 0.01, "{e} {exact}");
+        scene.materials[0].unlit = true;
+        assert!(Emitters::build(&scene).is_empty());
     }
 }

@@ -2,9 +2,9 @@
 
 use super::area::PolygonLight;
 use super::{EmitterKind, Emitters, hit_at, range_window, shone_at, spot_falloff};
-use crate::math::{Vec3, frame, offset_origin, to_world};
+use crate::math::{Vec2, Vec3, frame, offset_origin, to_world};
 use crate::scene::{Light, LightKind};
-use crate::{Ray, Rgb, Scene};
+use crate::{Ray, Rgb, Scene, sampling};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 /// A ray that leaves a light.
@@ -120,7 +120,8 @@ impl Start<'_> {
     ) -> Option<(Ray, Rgb)> {
         let solid_angle = TAU * (1.0 - cos_outer);
         let plain = |d: Vec3| if d.dot(axis) >= cos_outer - 1e-6 { 1.0 / solid_angle } else { 0.0 };
-        let (d, ratio) = self.direction(position, b, || cone(axis, cos_outer, b), plain)?;
+        let (d, ratio) =
+            self.direction(position, b, || to_world(sampling::cone(Vec2::from(b), cos_outer), axis), plain)?;
         Some((Ray::new(position, d), intensity(d.dot(axis)) * (solid_angle * ratio / self.probability)))
     }
 
@@ -132,8 +133,8 @@ impl Start<'_> {
         }
         let (s, t) = frame(d);
         let on_disc = |centre: Vec3, radius: f32| {
-            let (sin, cos) = (TAU * a[1]).sin_cos();
-            centre + (s * cos + t * sin) * (radius * a[0].sqrt())
+            let p = sampling::disc(Vec2::from(a)) * radius;
+            centre + s * p.x + t * p.y
         };
         let within =
             |x: Vec3, (c, r): (Vec3, f32)| (x - c).reject_from_normalized(d).length_squared() <= r * r;
@@ -194,7 +195,8 @@ impl Start<'_> {
 /// The directions in which a sphere is seen from a point.
 struct Cone {
     axis: Vec3,
-    cos: f32,
+    /// 1 − the cosine of the half angle, without the cancellation that would leave a narrow cone no digits.
+    depth: f32,
     sin2: f32,
     solid_angle: f32,
 }
@@ -206,11 +208,10 @@ impl Cone {
         let d2 = way.length_squared();
         let sin2 = radius * radius / d2;
         if d2 <= radius * radius || sin2 >= 1.0 {
-            return Cone { axis: Vec3::Y, cos: -1.0, sin2: f32::INFINITY, solid_angle: 2.0 * TAU };
+            return Cone { axis: Vec3::Y, depth: 2.0, sin2: f32::INFINITY, solid_angle: 2.0 * TAU };
         }
-        let cos = (1.0 - sin2).sqrt();
-        // 1 − cos without cancellation for small targets.
-        Cone { axis: way / d2.sqrt(), cos, sin2, solid_angle: TAU * sin2 / (1.0 + cos) }
+        let depth = sin2 / (1.0 + (1.0 - sin2).sqrt());
+        Cone { axis: way / d2.sqrt(), depth, sin2, solid_angle: TAU * depth }
     }
 
     /// By the sine, whose square still has digits where the cosine of a narrow cone has rounded to one.
@@ -221,18 +222,11 @@ impl Cone {
 
     /// A unit direction, even in solid angle.
     fn sample(&self, u: [f32; 2]) -> Vec3 {
-        let narrow = if self.sin2.is_infinite() { 2.0 } else { self.sin2 / (1.0 + self.cos) };
-        let down = u[0] * narrow;
+        let down = u[0] * self.depth;
         let r = (down * (2.0 - down)).max(0.0).sqrt();
         let (sin, cos) = (TAU * u[1]).sin_cos();
         to_world(Vec3::new(r * cos, r * sin, 1.0 - down), self.axis)
     }
-}
-
-/// As [`Cone::sample`], in the cone of cosine `cos` around `axis`.
-fn cone(axis: Vec3, cos: f32, u: [f32; 2]) -> Vec3 {
-    let sin2 = if cos <= -1.0 { f32::INFINITY } else { (1.0 - cos) * (1.0 + cos) };
-    Cone { axis, cos, sin2, solid_angle: TAU * (1.0 - cos) }.sample(u)
 }
 
 #[cfg(test)]

@@ -53,7 +53,7 @@ const NO_LIGHT: u32 = u32::MAX;
 pub enum EmitterKind {
     /// Emissive triangles of one radiance, joined to a convex polygon.
     Polygon(PolygonLight),
-    /// A triangle whose emission a texture, a vertex colour or alpha varies; its radiance is the mean.
+    /// A triangle whose emission a texture or alpha varies; its radiance is the mean.
     Textured(PolygonLight),
     /// A lamp of KHR_lights_punctual: point, spot or directional.
     Punctual(Light),
