@@ -29,7 +29,7 @@ pub struct Pixel {
     pub irradiance: Rgb,
     /// Estimated variance of the pixel's luminance (of the mean, not of one sample), (cd/m²)².
     pub variance: f32,
-    /// Rays through the pixel.
+    /// Rays through the pixel; 0 where it was not reached.
     pub samples: u32,
 }
 
@@ -125,6 +125,11 @@ impl Film {
     /// Sanitises all pixels and adds to [`Film::repaired`]; afterwards every number of the film is finite.
     pub fn sanitise(&mut self) {
         self.repaired += self.pixels.iter_mut().map(|p| u64::from(p.sanitise())).sum::<u64>();
+    }
+
+    /// Whether no pixel was reached.
+    pub fn is_blank(&self) -> bool {
+        self.pixels.iter().all(|p| p.samples == 0)
     }
 
     /// Radiance toward the eye of every pixel, cd/m².

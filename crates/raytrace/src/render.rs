@@ -74,7 +74,7 @@ pub struct Report {
 /// A picture and how it came about.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// The picture.
+    /// The picture; a pixel with 0 samples was not reached, and a film of nothing else is not worth a file.
     pub film: Film,
     /// Whether it is what was asked; false when the time was up or someone stopped it.
     pub finished: bool,

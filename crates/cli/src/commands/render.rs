@@ -54,6 +54,11 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
         let started = Instant::now();
         let outcome = render(&world, camera, &settings, &bars);
         bars.done();
+        if !outcome.finished && outcome.film.is_blank() {
+            // An old picture is worth more than a black one.
+            let why = if bars.interrupted() { "stopped" } else { "the time was up" };
+            anyhow::bail!("{why} before a pixel was rendered: {} is not written", output.display());
+        }
         let picture = save(&job, camera, &settings, outcome, output, preview, started)?;
         if picture.repaired > 0 {
             let message = "pixels were not finite or negative and are black instead; please report it";

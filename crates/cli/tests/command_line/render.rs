@@ -7,6 +7,36 @@ fn cornell() -> String {
     scene("cornell-box.gltf").to_str().expect("the repository's path is UTF-8").into()
 }
 
+/// A glTF file of one triangle that does not shine, with `more` at its top and a camera for each name.
+fn triangle(more: &str, cameras: &[&str]) -> String {
+    let nodes: String = cameras.iter().map(|name| format!(r#",{{"camera":0,"name":"{name}"}}"#)).collect();
+    let all: String = (0..cameras.len()).map(|i| format!(",{}", i + 1)).collect();
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},{more}"scene":0,"scenes":[{{"nodes":[0{all}]}}],
+        "nodes":[{{"mesh":0}}{nodes}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}}}}]}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}}],
+        "bufferViews":[{{"buffer":0,"byteLength":36}}],"buffers":[{{"byteLength":36,"uri":
+        "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}}]}}"#
+    )
+}
+
+#[test]
+fn each_camera_gets_a_file() {
+    let dir = folder();
+    let cameras =
+        r#""cameras":[{"type":"perspective","perspective":{"yfov":1,"znear":0.1,"aspectRatio":2}}],"#;
+    fs::write(dir.path().join("a.gltf"), triangle(cameras, &["Hall", "Kitchen"])).expect("it can be written");
+    let args = ["render", "a.gltf", "-o", "a.exr", "--camera", "all", "--width", "8", "--sky", "1"];
+    let run = twolight(dir.path(), &args);
+    assert_eq!(run.status, 0, "{}", run.err);
+    for name in ["a.Hall.exr", "a.Kitchen.exr"] {
+        let image = raytrace::exr::read_rgb(&dir.path().join(name)).expect("it was written");
+        assert_eq!((image.width, image.height), (8, 4));
+    }
+    let run = twolight(dir.path(), &["render", "a.gltf", "-o", "b.exr", "--size", "8x4", "--sky", "1"]);
+    assert!(run.err.contains("2 cameras") && run.out.contains("\"Hall\""), "{}{}", run.err, run.out);
+}
+
 #[test]
 fn a_picture_is_written_and_described() {
     let dir = folder();
@@ -52,14 +82,19 @@ fn json_describes_the_picture() {
 }
 
 #[test]
-fn no_time_gives_an_unfinished_picture() {
+fn no_time_gives_a_picture_that_says_so_or_leaves_the_old_one() {
     let dir = folder();
+    fs::write(dir.path().join("a.exr"), "precious").expect("it can be written");
     let args = ["render", &cornell(), "-o", "a.exr", "--size", "64x64", "--time-limit", "0.000001s"];
     let run = twolight(dir.path(), &args);
-    assert_eq!(run.status, 0, "{}", run.err);
-    assert!(run.out.contains("unfinished"), "{}", run.out);
-    let bytes = fs::read(dir.path().join("a.exr")).expect("it was written");
-    assert!(bytes.windows(19).any(|w| w == b"twolight:unfinished"));
+    let bytes = fs::read(dir.path().join("a.exr")).expect("it is there");
+    match run.status {
+        0 => {
+            assert!(run.out.contains("unfinished"), "{}", run.out);
+            assert!(bytes.windows(19).any(|w| w == b"twolight:unfinished"));
+        }
+        _ => assert!(bytes == b"precious" && run.err.contains("the time was up"), "{}", run.err),
+    }
 }
 
 #[test]
@@ -100,12 +135,7 @@ fn an_unknown_camera_or_a_wrong_kind_of_file_is_asked_wrongly() {
 #[test]
 fn a_dark_or_cameraless_scene_is_told_so_unless_quiet() {
     let dir = folder();
-    let gltf = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
-        "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
-        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}],
-        "bufferViews":[{"buffer":0,"byteLength":36}],
-        "buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
-    fs::write(dir.path().join("dark.gltf"), gltf).expect("it can be written");
+    fs::write(dir.path().join("dark.gltf"), triangle("", &[])).expect("it can be written");
     let render = |more: &[&str]| {
         let run = twolight(
             dir.path(),

@@ -29,41 +29,24 @@ pub fn write(film: &Film, metadata: &Metadata, path: &Path) -> std::result::Resu
         ("normal", XYZ, Format::Fitting, |p| p.normal.to_array()),
         ("position", XYZ, Format::Float, |p| p.position.to_array()),
     ];
-    let beauty = film.beauty();
-    let mut layers = vec![Layer {
-        names: ["R", "G", "B", "A"].map(String::from).to_vec(),
-        values: (0..3)
-            .map(|c| beauty.iter().map(|b| b[c]).collect())
-            .chain([film.pixels.iter().map(|p| p.alpha).collect()])
-            .collect(),
-        format: Format::Fitting,
-    }];
-    for (name, channels, format, get) in triples {
-        layers.push(Layer {
-            names: channels.map(|c| format!("{name}.{c}")).to_vec(),
-            values: (0..3).map(|c| film.pixels.iter().map(|p| get(p)[c]).collect()).collect(),
-            format,
-        });
+    let n = film.pixels.len();
+    let mut channels = layer(["R", "G", "B", "A"], Format::Fitting, n, |i| {
+        let Rgb { r, g, b } = film.pixels[i].beauty();
+        [r, g, b, film.pixels[i].alpha]
+    });
+    for (name, names, format, get) in triples {
+        channels.extend(layer(names.map(|c| format!("{name}.{c}")), format, n, |i| get(&film.pixels[i])));
     }
-    let scalar = |name: &str, format, get: fn(&Pixel) -> f32| Layer {
-        names: vec![name.into()],
-        values: vec![film.pixels.iter().map(get).collect()],
-        format,
-    };
-    layers.push(scalar("depth.Z", Format::Float, |p| p.depth));
-    layers.push(scalar("variance.Y", Format::Fitting, |p| p.variance));
-    save(layers, film.width, film.height, metadata, path)
+    channels.extend(layer(["depth.Z"], Format::Float, n, |i| [film.pixels[i].depth]));
+    channels.extend(layer(["variance.Y"], Format::Fitting, n, |i| [film.pixels[i].variance]));
+    save(channels, film.width, film.height, metadata, path)
 }
 
 /// Writes a plain picture as R, G, B to `path`, atomically.
 pub fn write_rgb(image: &Image, metadata: &Metadata, path: &Path) -> std::result::Result<(), Error> {
-    let channel = |f: fn(&Rgb) -> f32| image.pixels.iter().map(f).collect();
-    let layer = Layer {
-        names: ["R", "G", "B"].map(String::from).to_vec(),
-        values: vec![channel(|c| c.r), channel(|c| c.g), channel(|c| c.b)],
-        format: Format::Fitting,
-    };
-    save(vec![layer], image.width, image.height, metadata, path)
+    let channels =
+        layer(["R", "G", "B"], Format::Fitting, image.pixels.len(), |i| image.pixels[i].to_array());
+    save(channels, image.width, image.height, metadata, path)
 }
 
 /// How the numbers of a layer are stored.
@@ -75,33 +58,31 @@ enum Format {
     Fitting,
 }
 
-/// Channels that share a format: viewers expect R, G and B of one layer to be of one kind.
-struct Layer {
-    names: Vec<String>,
-    values: Vec<Vec<f32>>,
+/// The channels of one layer, each of `n` pixels. They share a format: viewers expect R, G and B to be of one kind.
+/// The numbers are asked for twice rather than kept: a large picture has gigabytes of them.
+fn layer<const C: usize>(
+    names: [impl AsRef<str>; C],
     format: Format,
+    n: usize,
+    get: impl Fn(usize) -> [f32; C],
+) -> Vec<AnyChannel<FlatSamples>> {
+    let peak = || (0..n).flat_map(&get).fold(0f32, |m, v| m.max(v.abs()));
+    let half = format == Format::Fitting && fits_half(peak());
+    let samples = |c: usize| match half {
+        true => FlatSamples::F16((0..n).map(|i| f16::from_f32(get(i)[c])).collect()),
+        false => FlatSamples::F32((0..n).map(|i| get(i)[c]).collect()),
+    };
+    names.iter().enumerate().map(|(c, name)| AnyChannel::new(name.as_ref(), samples(c))).collect()
 }
 
-impl Layer {
-    /// Whether half floats hold this layer: nothing above their largest number, 65504, and its brightest value
-    /// at least 2⁻⁴, so that a thousandth of it is still above 2⁻¹⁴, below which halves lose digits.
-    fn fits_half(&self) -> bool {
-        let peak = self.values.iter().flatten().fold(0f32, |m, v| m.max(v.abs()));
-        peak == 0.0 || (0.0625..=65504.0).contains(&peak)
-    }
-
-    fn into_channels(self) -> Vec<AnyChannel<FlatSamples>> {
-        let half = self.format == Format::Fitting && self.fits_half();
-        let samples = |values: Vec<f32>| match half {
-            true => FlatSamples::F16(values.into_iter().map(f16::from_f32).collect()),
-            false => FlatSamples::F32(values),
-        };
-        self.names.iter().zip(self.values).map(|(n, v)| AnyChannel::new(n.as_str(), samples(v))).collect()
-    }
+/// Whether half floats hold a layer whose largest number is `peak`: none above their own largest, 65504, and the
+/// peak at least 2⁻⁴, so that a thousandth of it is still above 2⁻¹⁴, below which halves lose digits.
+fn fits_half(peak: f32) -> bool {
+    peak == 0.0 || (0.0625..=65504.0).contains(&peak)
 }
 
 fn save(
-    layers: Vec<Layer>,
+    channels: Vec<AnyChannel<FlatSamples>>,
     width: u32,
     height: u32,
     metadata: &Metadata,
@@ -112,7 +93,7 @@ fn save(
         return Err(encode_error("it has no pixels".into()));
     }
     let size = Vec2(width as usize, height as usize);
-    let channels = AnyChannels::sort(layers.into_iter().flat_map(Layer::into_channels).collect());
+    let channels = AnyChannels::sort(channels.into());
     let mut own = LayerAttributes {
         software_name: Some(Text::from(concat!("twolight ", env!("CARGO_PKG_VERSION")))),
         // OpenEXR multiplies row vectors from the left, glam column vectors from the right: the same sixteen
@@ -226,10 +207,8 @@ mod tests {
 
     #[test]
     fn half_is_chosen_only_where_it_keeps_the_digits() {
-        let layer =
-            |peak: f32| Layer { names: vec![], values: vec![vec![0.0, -peak]], format: Format::Fitting };
         for (peak, half) in [(0.0, true), (1.0, true), (65504.0, true), (65505.0, false), (1e-3, false)] {
-            assert_eq!(layer(peak).fits_half(), half, "{peak}");
+            assert_eq!(fits_half(peak), half, "{peak}");
         }
     }
 
