@@ -65,7 +65,7 @@ impl Ggx {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling::{Lattice2, cosine_hemisphere, cosine_hemisphere_pdf_solid_angle};
+    use crate::sampling::{Lattice2, cone, cone_pdf_solid_angle};
 
     #[test]
     fn the_distribution_is_normalised() {
@@ -74,8 +74,8 @@ mod tests {
             let ggx = Ggx { alpha };
             let sum: f64 = (0..4000)
                 .map(|i| {
-                    let h = cosine_hemisphere(lattice.point(i, Vec2::splat(1e-4)));
-                    f64::from(ggx.d(h) * h.z / cosine_hemisphere_pdf_solid_angle(h.z))
+                    let h = cone(lattice.point(i, Vec2::splat(1e-4)), 0.0);
+                    f64::from(ggx.d(h) * h.z / cone_pdf_solid_angle(0.0))
                 })
                 .sum();
             assert!((sum / 4000.0 - 1.0).abs() < 5e-3, "{alpha}: {}", sum / 4000.0);
@@ -89,8 +89,8 @@ mod tests {
             let (ggx, wo) = (Ggx { alpha }, Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos));
             let sum: f64 = (0..4000)
                 .map(|i| {
-                    let h = cosine_hemisphere(lattice.point(i, Vec2::splat(1e-4)));
-                    f64::from(ggx.pdf_visible(wo, h) / cosine_hemisphere_pdf_solid_angle(h.z))
+                    let h = cone(lattice.point(i, Vec2::splat(1e-4)), 0.0);
+                    f64::from(ggx.pdf_visible(wo, h) / cone_pdf_solid_angle(0.0))
                 })
                 .sum();
             assert!((sum / 4000.0 - 1.0).abs() < 1e-2, "{alpha} {cos}: {}", sum / 4000.0);

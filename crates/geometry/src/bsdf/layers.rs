@@ -182,7 +182,13 @@ impl Layers {
             sum += self.base_color * (self.thin * (scattered.all - reflected));
         }
         if self.solid > 0.0 {
-            sum += (self.glass(cos_o) * self.solid + self.transmission(cos_o)) * scattered.all;
+            let reflected = |cos| self.glass(cos) * self.solid;
+            let passed = |cos| self.transmission(cos);
+            sum += if self.is_delta() {
+                reflected(cos_o) + passed(cos_o)
+            } else {
+                albedo::rough_glass(self.alpha, self.eta, cos_o, reflected, passed)
+            };
         }
         sum
     }

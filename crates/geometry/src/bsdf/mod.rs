@@ -15,8 +15,9 @@
 //!   factor sends back up to 1.6 times the light received at grazing angles, this one exactly what the coat leaves.
 //!   It is reciprocal, and a white dielectric vanishes in a white furnace at every roughness.
 //! - Glass with a volume uses the exact Fresnel equations at its interface; everything else uses Schlick's.
-//! - Single scattering: what bounces twice between microfacets is lost, 0 for smooth surfaces and at most 60 % of a
-//!   white metal's light at roughness 1 (`the_loss_of_single_scattering_is_as_stated` holds the numbers).
+//! - Single scattering: what bounces twice between microfacets is lost, of a white metal's light
+//!   1.3 % at roughness 0.25, 12 % at 0.5, 34 % at 0.75, 59 % at 1; of white glass at most 1, 20 and 57 % at
+//!   0.1, 0.5 and 1. Dielectrics over a diffuse base lose nothing: what the coat drops, the base takes up.
 
 mod albedo;
 mod diffuse;
@@ -115,8 +116,8 @@ impl Bsdf {
     }
 
     /// Share of a uniform light from all directions that all other lobes together, delta ones included, send to
-    /// `wo`, [0, 1]; an energy, without the η² of radiance. From a table (±0.005); for rough glass
-    /// with a volume the Fresnel term is taken at the shading normal, which errs by a few per cent.
+    /// `wo`, [0, 1]; an energy, without the η² of radiance. From a table (±0.005, ±0.012 within 2° of grazing); for
+    /// rough glass with a volume a small quadrature (±0.04).
     pub fn specular_albedo(&self, wo: Vec3) -> Rgb {
         self.layers.specular_albedo(wo.dot(self.normal))
     }

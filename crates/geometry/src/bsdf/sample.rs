@@ -103,10 +103,13 @@ impl Bsdf {
         [keep(self.mirror(wo, cos)), self.pass(wo, cos).and_then(keep)]
     }
 
-    /// Chance that `sample` goes on diffusely; `None` when every lobe is black at `wo`.
+    /// Chance that `sample` goes on diffusely; `None` when there is no lobe.
     fn chance_of_diffuse(&self, wo: Vec3) -> Option<f32> {
         if wo.dot(self.normal) <= 0.0 {
             return None;
+        }
+        if !self.has_diffuse() {
+            return self.has_specular().then_some(0.0);
         }
         let diffuse = self.diffuse_albedo(wo).max_channel();
         let specular = self.specular_albedo(wo).max_channel();
@@ -149,6 +152,10 @@ impl Bsdf {
         } else {
             (Vec3::new(mirrored.x, mirrored.y, -mirrored.z), Lobe::Transmission)
         };
+        // A facet may send light to where the surface itself is in the way; single scattering loses it.
+        if (wi.z > 0.0) != (lobe == Lobe::Reflection) {
+            return None;
+        }
         let wi = self.to_world(wi);
         Some(BsdfSample { wi, weight: Rgb::BLACK, pdf: 0.0, delta: false, straight: false, lobe })
     }

@@ -76,7 +76,7 @@ fn no_material_makes_light_and_the_albedos_say_how_much_it_sends() {
             assert!(sent.max_channel() < 1.01, "{shading:?} at {cos}: {sent:?}");
             let stated = bsdf.diffuse_albedo(wo) + bsdf.specular_albedo(wo);
             let rough_glass = bsdf.layers.refracts() && !bsdf.is_delta();
-            let tolerance = if rough_glass { 0.2 } else { 0.015 };
+            let tolerance = if rough_glass { 0.04 } else { 0.015 };
             let difference = (sent - stated).map(f32::abs).max_channel();
             assert!(difference < tolerance, "{shading:?} at {cos}: {sent:?}, stated {stated:?}");
         }
@@ -102,8 +102,8 @@ fn white_dielectrics_and_smooth_glass_vanish_in_a_white_furnace() {
 
 #[test]
 fn rough_white_glass_loses_no_more_than_stated() {
-    // What single scattering loses: nothing at roughness 0.1, at most 13 % at 0.5.
-    for (roughness, loss) in [(0.1, 0.01), (0.3, 0.03), (0.5, 0.13)] {
+    // What single scattering loses, more on the way out than on the way in.
+    for (roughness, loss) in [(0.1, 0.01), (0.3, 0.05), (0.5, 0.2), (1.0, 0.57)] {
         for (cos, front) in [(1.0, true), (0.4, true), (0.9, false), (0.4, false)] {
             let glass = bsdf(&Shading { roughness, ..GLASS }, front).with_transport(Transport::Importance);
             let sent = furnace(&glass, direction(cos), 4000).r;
@@ -262,7 +262,7 @@ fn nothing_is_ever_nan() {
                         assert!(bsdf.eval(wo, wi).is_finite() && bsdf.eval(wo, wi).min_channel() >= 0.0);
                         assert!(bsdf.pdf(wo, wi).is_finite() && bsdf.pdf(wo, wi) >= 0.0);
                         for s in [bsdf.sample(wo, rng.array()), bsdf.sample_specular(wo, rng.array())] {
-                            assert!(s.is_none_or(|s| cos > 0.0 && s.weight.is_finite() && s.wi.is_finite()));
+                            assert!(s.is_none_or(|s| cos >= 0.0 && s.weight.is_finite() && s.wi.is_finite()));
                         }
                     }
                     assert!(bsdf.eval(wo, wo).is_finite() && bsdf.eval(wo, -wo).is_finite());
@@ -292,8 +292,9 @@ fn the_two_perfect_branches_are_what_sampling_chooses_from() {
 #[test]
 fn a_slab_of_glass_reflects_and_transmits_the_series_of_all_orders() {
     // R = 2r/(1+r) = 0.0769 and T = (1−r)/(1+r) = 0.9231 for n = 1.5 (r = 0.04), upright.
-    // T at 45° and 75°: Fresnel's equations in double precision, (1−r)/(1+r) with r there.
-    for (degrees, transmitted) in [(0.0f32, 0.92307692), (45.0, 0.90734433), (75.0, 0.61814852)] {
+    // T at 45° and 75°: (1−r)/(1+r) with the unpolarised r = 0.05023991 and 0.25306056. Light that keeps its
+    // polarisation between the faces has 0.9073 and 0.6181; we do not follow it.
+    for (degrees, transmitted) in [(0.0f32, 0.92307692), (45.0, 0.90432677), (75.0, 0.59609231)] {
         let wo = direction(degrees.to_radians().cos());
         let [mirror, pass] = bsdf(&GLASS, true).delta_lobes(wo);
         let (mut r, mut t) = (mirror.unwrap().weight.r, 0.0);

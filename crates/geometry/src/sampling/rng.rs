@@ -67,7 +67,7 @@ mod tests {
         let mut rng = Rng::new(7, 11);
         assert_eq!([rng.u32(), rng.u32(), rng.u32()], STREAM_7_11);
     }
-    const STREAM_7_11: [u32; 3] = [0, 0, 0];
+    const STREAM_7_11: [u32; 3] = [651_002_549, 4_211_512_709, 2_954_859_377];
 
     #[test]
     fn moments_within_a_stream_and_across_streams() {

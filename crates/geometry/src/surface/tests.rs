@@ -1,8 +1,9 @@
 //! Surfaces of a single triangle.
 
 use super::*;
-use crate::math::{Vec2, Vec4};
-use crate::{AlphaMode, Material, Mesh, Part};
+use crate::math::{Affine2, Vec2, Vec4};
+use crate::texture::{Texture, Wrap};
+use crate::{AlphaMode, Material, Mesh, Part, TextureRef};
 
 /// One triangle in the plane z = 0, front toward +z, of the given material.
 fn scene(material: Material) -> Scene {
@@ -139,4 +140,54 @@ fn questions_about_materials() {
     let plastic = Material { metallic: 0.0, ..Material::default() };
     assert!(plastic.has_specular(0.03) && !plastic.has_specular(0.05));
     assert!(Material::default().has_specular(0.5));
+}
+
+/// A texture of one texel, and how a material names it.
+fn texel(value: [u8; 4]) -> (Texture, Option<TextureRef>) {
+    let wrap = Wrap::Repeat;
+    let name = "one".into();
+    let texture =
+        Texture { name, width: 1, height: 1, texels: vec![value], wrap_s: wrap, wrap_t: wrap, linear: false };
+    (texture, Some(TextureRef { texture: 0, uv_set: 0, transform: Affine2::IDENTITY }))
+}
+
+#[test]
+fn textures_multiply_their_factors_each_in_its_channel() {
+    let (texture, reference) = texel([255, 128, 64, 51]);
+    let mut scene = scene(Material {
+        base_color: Rgb::new(0.5, 1.0, 1.0),
+        base_color_texture: reference,
+        metallic_roughness_texture: reference,
+        specular_texture: reference,
+        transmission: 0.5,
+        transmission_texture: reference,
+        alpha_mode: AlphaMode::Blend,
+        ..Material::default()
+    });
+    scene.textures = vec![texture];
+    let s = shading_at(&scene, 0, 0.2, 0.2);
+    // sRGB 128 is 0.2159 linear (IEC 61966-2-1), linear 128 is 0.502.
+    assert!((s.base_color.r - 0.5).abs() < 1e-4 && (s.base_color.g - 0.2159).abs() < 1e-3, "{s:?}");
+    assert!((s.roughness - 0.502).abs() < 1e-3 && (s.metallic - 0.251).abs() < 1e-3, "{s:?}");
+    assert!((s.specular - 0.2).abs() < 1e-3 && (s.transmission - 0.5).abs() < 1e-4, "{s:?}");
+    assert!((surface(&scene, Vec3::NEG_Z).coverage - 0.2).abs() < 1e-3);
+    // A texture that is not there is none.
+    scene.textures.clear();
+    assert_eq!(shading_at(&scene, 0, 0.2, 0.2).base_color, Rgb::new(0.5, 1.0, 1.0));
+}
+
+#[test]
+fn a_normal_map_leans_along_the_tangent_on_either_side() {
+    // x = 0.6 and z = 0.8, encoded as (1 + x)/2.
+    let (texture, reference) = texel([204, 128, 230, 255]);
+    let mut scene = scene(Material { normal_texture: reference, ..Material::default() });
+    scene.textures = vec![texture];
+    scene.mesh.tangents = vec![Vec4::new(1.0, 0.0, 0.0, 1.0); 3];
+    let front = surface(&scene, Vec3::NEG_Z);
+    assert!((front.ns - Vec3::new(0.6, 0.0, 0.8)).length() < 1e-2, "{}", front.ns);
+    assert_eq!(front.smooth, Vec3::Z);
+    // Seen from behind it is the same relief from behind.
+    assert!((surface(&scene, Vec3::Z).ns + front.ns).length() < 1e-6);
+    scene.materials[0].normal_scale = 0.0;
+    assert!((surface(&scene, Vec3::NEG_Z).ns - Vec3::Z).length() < 1e-6);
 }
