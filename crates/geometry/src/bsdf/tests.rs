@@ -180,7 +180,7 @@ fn a_weight_is_f_cos_over_pdf_and_importance_has_no_eta_squared() {
 #[test]
 fn samples_follow_their_density() {
     // 10⁵ samples over 24 × 48 cells of the sphere, cells of fewer than 8 expected pooled; z < 5.2: one false
-    // alarm in 10⁷ for each of the eleven. A lobe wrong by 5 % in a tenth of the cells gives z > 6.
+    // alarm in 10⁷ for each of the eighteen. A lobe wrong by 5 % in a tenth of the cells gives z > 6.
     let cases = [
         (WHITE_LAMBERT, true),
         (Shading { roughness: 0.6, ..METAL }, true),
