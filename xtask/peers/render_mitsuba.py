@@ -197,7 +197,7 @@ def sensor(gltf, name, width, height):
             "pixel_format": "rgb",
             "component_format": "float32",
         },
-        "sampler": {"type": "independent"},
+        "sampler": {"type": "multijitter"},
     }
 
 
@@ -217,7 +217,8 @@ def load(path, camera, width, height):
 def halves(scene, spp, budget):
     """Two independent means of `spp` samples a pixel, made in passes small enough for memory; fewer passes when
     `budget` seconds of processor time are over. Returns both pictures and the samples each has."""
-    per_pass = min(spp, 128)
+    # A square number, so that the sampler can stratify a pass over the pixel.
+    per_pass = min(math.ceil(math.sqrt(spp)), 12) ** 2
     totals, passes, start = [0.0, 0.0], 0, time.process_time()
     while passes * per_pass < spp and (passes == 0 or time.process_time() - start < budget):
         for i in (0, 1):

@@ -94,7 +94,8 @@ fn window(doc: &mut Document, palette: &Palette) {
     let left = upright(x0 + t - 0.005, middle - 0.5 * t + 0.005, y0, y1, -0.1);
     let right = upright(middle + 0.5 * t - 0.005, x1 - t + 0.005, y0, y1, -0.1);
     doc.add("window panes", &left.with(&right), palette.pane);
-    doc.add("sky", &upright(-2.5, 9.5, -1.5, 4.5, -1.6).pictured(), palette.sky);
+    // The painted hills end at eye height, where a horizon is.
+    doc.add("sky", &upright(-2.5, 9.5, -0.4, 5.6, -1.6).pictured(), palette.sky);
 }
 
 /// Two panels under the ceiling, a ball that hangs over the table, the housing of the picture light.
