@@ -1,1 +1,29 @@
-//! radiosity
+//! What the light does, wherever we stand: diffuse interreflection solved once, without a camera, and kept at
+//! mesh vertices.
+//!
+//! ```text
+//! World ─ element ─▶ Elements ─ gather ─▶ rows of F ─ solver ─▶ E at vertices ─▶ Solution
+//!                        ▲                                          │
+//!                        └──────────── refine: where E bends ◀──────┘
+//! ```
+//!
+//! The unknown is the *indirect* irradiance E (lx): light that has left at least one diffuse surface. The
+//! emitters' own light is not in it, because pass 2 fetches that for each pixel; the light they throw on the
+//! surfaces that a gather ray hits is. Light that arrives from an emitter by way of mirrors and glass alone is
+//! kept apart, as photons ([`caustic`]).
+
+pub mod caustic;
+pub mod element;
+pub mod field;
+pub mod flags;
+pub mod gather;
+pub mod reach;
+pub mod refine;
+pub mod solution;
+pub mod solver;
+pub mod transport;
+
+mod solve;
+
+pub use solution::{Report, Solution};
+pub use solve::{Config, Error, Progress, solve};

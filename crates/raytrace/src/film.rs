@@ -39,6 +39,29 @@ impl Pixel {
         self.direct + self.indirect + self.specular + self.emission
     }
 
+    /// Both pixels' samples together: means weighted by their number, the variance that of the joint mean.
+    pub fn merged(&self, other: &Pixel) -> Pixel {
+        let samples = self.samples + other.samples;
+        if samples == 0 {
+            return *self;
+        }
+        let t = other.samples as f32 / samples as f32;
+        Pixel {
+            direct: self.direct.lerp(other.direct, t),
+            indirect: self.indirect.lerp(other.indirect, t),
+            specular: self.specular.lerp(other.specular, t),
+            emission: self.emission.lerp(other.emission, t),
+            alpha: self.alpha * (1.0 - t) + other.alpha * t,
+            albedo: self.albedo.lerp(other.albedo, t),
+            normal: self.normal.lerp(other.normal, t),
+            depth: self.depth * (1.0 - t) + other.depth * t,
+            position: self.position.lerp(other.position, t),
+            irradiance: self.irradiance.lerp(other.irradiance, t),
+            variance: self.variance * (1.0 - t) * (1.0 - t) + other.variance * t * t,
+            samples,
+        }
+    }
+
     /// Sets to 0 whatever is not a number, not finite, or negative where that has no meaning.
     ///
     /// Returns whether anything had to be set.

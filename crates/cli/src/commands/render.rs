@@ -8,7 +8,7 @@ use crate::{cameras, load};
 use anyhow::{Context, Result};
 use geometry::{Camera, Scene, World};
 use raytrace::exr::Metadata;
-use raytrace::{Integrator, Outcome, Progress, Settings, exr, render, tonemap};
+use raytrace::{Integrator, Outcome, Progress, Settings, exr, prepass, render, tonemap};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -47,12 +47,22 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
     let world = World::new(loaded.scene);
     let several = job.camera.as_deref() == Some("all");
     let mut pictures = Vec::new();
+    let (mut solution, mut prepass_seconds) = (None, 0.0);
     for camera in &choice.cameras {
         let path = |base: &Path| if several { with_name(base, &camera.name) } else { base.to_path_buf() };
         let (output, preview) = (path(&job.output), job.preview.as_deref().map(path));
         let settings = job.settings(camera)?;
         let started = Instant::now();
-        let outcome = render(&world, camera, &settings, &bars);
+        if settings.integrator == Integrator::Hybrid && solution.is_none() {
+            // Light does not know where we stand: one solution serves all views.
+            solution = Some(
+                prepass(&world, &settings, &bars)
+                    .with_context(|| format!("cannot solve {}", job.scene.display()))?,
+            );
+            prepass_seconds = started.elapsed().as_secs_f64();
+        }
+        let mut outcome = render(&world, camera, solution.as_ref(), &settings, &bars)?;
+        outcome.report.stages.insert(0, ("prepass", std::mem::take(&mut prepass_seconds)));
         bars.done();
         if !outcome.finished && outcome.film.is_blank() {
             // An old picture is worth more than a black one.
@@ -98,7 +108,6 @@ struct Picture {
     finished: bool,
     seconds: f64,
     stages: BTreeMap<&'static str, f64>,
-    rays: u64,
     exposure: Option<f32>,
     repaired: u64,
     report: BTreeMap<String, String>,
@@ -155,7 +164,6 @@ fn save(
         finished,
         seconds: started.elapsed().as_secs_f64(),
         stages: report.stages.into_iter().collect(),
-        rays: report.rays,
         exposure,
         repaired: film.repaired,
         report: report.texts.into_iter().collect(),

@@ -1,5 +1,6 @@
 //! Light along one camera ray: which methods there are, and the layers they all sort their light into.
 
+pub mod hybrid;
 pub mod path;
 
 use geometry::{Rgb, Vec3};

@@ -1,0 +1,135 @@
+//! Irradiance over the element mesh: gathered at sites, interpolated at the other vertices.
+
+use crate::element::cluster::Grid;
+use crate::element::{Elements, Side, Vertex, VertexId, slot};
+use crate::transport::Row;
+use geometry::math::offset_origin;
+use geometry::{Ray, Rgb, World};
+use rayon::prelude::*;
+
+/// One side of one vertex where rays were gathered.
+#[derive(Clone, Debug)]
+pub struct Site {
+    /// Which vertex.
+    pub vertex: VertexId,
+    /// Which side of it.
+    pub side: Side,
+    /// What was gathered.
+    pub row: Row,
+}
+
+/// Where a slot's value comes from.
+#[derive(Clone, Copy, Debug)]
+enum Source {
+    /// Light cannot reach it, or it is buried in something: it says nothing about its surroundings.
+    Nothing,
+    /// It was gathered.
+    Site(u32),
+    /// Interpolated from sites near by; weights sum to 1, unused ones are 0.
+    Near([u32; 4], [f32; 4]),
+}
+
+/// Sites, and how every vertex draws on them.
+#[derive(Clone, Debug, Default)]
+pub struct Field {
+    /// In the order in which they were gathered.
+    pub sites: Vec<Site>,
+    sources: Vec<Source>,
+}
+
+/// A site most of whose rays first meet a dead side is buried in an object.
+const BURIED: f32 = 0.5;
+
+impl Field {
+    /// Whether the slot has a value that its surroundings may be interpolated from.
+    pub fn usable(&self, slot: usize) -> bool {
+        !matches!(self.sources[slot], Source::Nothing)
+    }
+
+    /// Number of slots.
+    pub fn slots(&self) -> usize {
+        self.sources.len()
+    }
+
+    /// From a value at each site to a value at each slot.
+    pub fn spread(&self, e: &[Rgb]) -> Vec<Rgb> {
+        let value = |source: &Source| match source {
+            Source::Nothing => Rgb::BLACK,
+            Source::Site(i) => e[*i as usize],
+            Source::Near(sites, weights) => {
+                sites.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(&i, &w)| e[i as usize] * w).sum()
+            }
+        };
+        self.sources.par_iter().map(value).collect()
+    }
+
+    /// Finds for every slot where its value comes from, after sites were added or the mesh was refined.
+    ///
+    /// `radius` is the reach of a site ([`crate::element::cluster`]).
+    pub fn connect(&mut self, world: &World, elements: &Elements, radius: f32) {
+        let vertices = &elements.vertices;
+        let mut grids = [Grid::new(radius), Grid::new(radius)];
+        let mut site_of = vec![u32::MAX; 2 * vertices.len()];
+        for (i, site) in self.sites.iter().enumerate() {
+            site_of[slot(site.vertex, site.side)] = i as u32;
+            if site.row.dead <= BURIED {
+                grids[site.side.index()].insert(vertices, site.vertex);
+            }
+        }
+        let sites = &self.sites;
+        self.sources = (0..site_of.len())
+            .into_par_iter()
+            .map(|s| {
+                let (v, side) = ((s / 2) as VertexId, Side::BOTH[s % 2]);
+                match site_of[s] {
+                    u32::MAX => near(world, vertices, &grids[s % 2], &site_of, v, side),
+                    i if sites[i as usize].row.dead > BURIED => Source::Nothing,
+                    i => Source::Site(i),
+                }
+            })
+            .collect();
+    }
+}
+
+/// Up to four of the sites near `v`, those that it can see, by inverse distance (Franke and Little's weights, which
+/// fall to zero at the edge of the search so that the choice of four leaves no jump).
+fn near(world: &World, vertices: &[Vertex], grid: &Grid, site_of: &[u32], v: VertexId, side: Side) -> Source {
+    let at = &vertices[v as usize];
+    let mut best = [(f32::INFINITY, VertexId::MAX); 5];
+    for (other, d2) in grid.near(vertices, at) {
+        if (d2, other) < best[4] {
+            best[4] = (d2, other);
+            best.sort_by(|a, b| a.partial_cmp(b).expect("distances are numbers"));
+        }
+    }
+    let edge = best[4].0.min(1.0).sqrt();
+    let (mut sites, mut weights) = ([0; 4], [0.0; 4]);
+    for (k, &(d2, other)) in best[..4].iter().enumerate() {
+        if other == VertexId::MAX || !sees(world, at, &vertices[other as usize], side) {
+            continue;
+        }
+        let d = d2.sqrt().max(1e-4);
+        sites[k] = site_of[slot(other, side)];
+        weights[k] = ((edge * 1.0001 - d).max(1e-6 * edge) / (edge * d)).powi(2);
+    }
+    let sum: f32 = weights.iter().sum();
+    if sum <= 0.0 {
+        return Source::Nothing;
+    }
+    Source::Near(sites, weights.map(|w| w / sum))
+}
+
+/// Whether nothing stands between two vertices. The line is lifted by a good part of its length, for on a curved
+/// surface the chord runs through the solid.
+fn sees(world: &World, a: &Vertex, b: &Vertex, side: Side) -> bool {
+    let lift =
+        |v: &Vertex, d: f32| offset_origin(v.position, v.normal * side.sign()) + v.normal * (side.sign() * d);
+    let d = (0.3 * a.position.distance(b.position)).max(1e-4 * world.diagonal);
+    let (from, to) = (lift(a, d), lift(b, d));
+    let length = from.distance(to);
+    if length <= 0.0 {
+        return true;
+    }
+    let ray = Ray { t_max: length, ..Ray::new(from, (to - from) / length) };
+    !world.bvh.occluded(&ray)
+}

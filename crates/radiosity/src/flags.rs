@@ -1,0 +1,91 @@
+//! Where the mesh cannot be trusted: leaves that something pierces, and leaves that light bends in too sharply.
+
+use crate::element::{Elements, Side, slot};
+use geometry::math::offset_origin;
+use geometry::{Ray, Vec3, World, triangle};
+
+/// Something stands across the leaf: its corners may not see each other.
+const PIERCED: u8 = 1;
+/// The light on it is not linear, or a corner of it says nothing.
+const UNRESOLVED: u8 = 2;
+
+/// For each node and side, what is wrong with it.
+#[derive(Clone, Debug, Default)]
+pub struct Flags {
+    bits: Vec<u8>,
+}
+
+impl Flags {
+    /// Asks for every leaf side: whether it is pierced, whether it is unresolved.
+    pub(crate) fn collect(elements: &Elements, ask: impl Fn(u32, Side) -> (bool, bool) + Sync) -> Flags {
+        use rayon::prelude::*;
+        let mut bits = vec![0; 2 * elements.nodes.len()];
+        bits.par_chunks_mut(2).enumerate().for_each(|(n, bits)| {
+            let node = &elements.nodes[n];
+            if !node.is_leaf() || node.vertices[0] == u32::MAX {
+                return;
+            }
+            for side in Side::BOTH {
+                let (pierced, unresolved) = ask(n as u32, side);
+                bits[side.index()] = u8::from(pierced) * PIERCED + u8::from(unresolved) * UNRESOLVED;
+            }
+        });
+        Flags { bits }
+    }
+
+    fn get(&self, node: u32, side: Side) -> u8 {
+        self.bits.get(2 * node as usize + side.index()).copied().unwrap_or(0)
+    }
+
+    /// Whether anything is wrong.
+    pub fn any(&self, node: u32, side: Side) -> bool {
+        self.get(node, side) != 0
+    }
+
+    /// Whether something stands across the leaf.
+    pub fn pierced(&self, node: u32, side: Side) -> bool {
+        self.get(node, side) & PIERCED != 0
+    }
+
+    /// Flagged leaf sides over all node sides.
+    pub fn share(&self) -> f32 {
+        self.bits.iter().filter(|b| **b != 0).count() as f32 / self.bits.len().max(1) as f32
+    }
+}
+
+/// Corner weights of a point in a leaf, with the corners that must not speak for it left out and the rest scaled to
+/// sum to 1: those whose slot is not usable, and in a pierced leaf those that the point cannot see.
+///
+/// `None` when no corner is usable. When none is visible, the usable ones speak after all.
+pub(crate) fn visible_weights(
+    world: &World,
+    elements: &Elements,
+    flags: &Flags,
+    usable: impl Fn(usize) -> bool,
+    node: u32,
+    side: Side,
+    w: [f32; 3],
+) -> Option<[f32; 3]> {
+    let corners = elements.nodes[node as usize].vertices;
+    let normalise = |w: [f32; 3]| {
+        let sum: f32 = w.iter().sum();
+        (sum > 1e-6).then(|| w.map(|x| x / sum))
+    };
+    let spoken = std::array::from_fn(|i| if usable(slot(corners[i], side)) { w[i] } else { 0.0 });
+    if !flags.pierced(node, side) {
+        return normalise(spoken);
+    }
+    let places = elements.corners(node);
+    let normal = triangle::normal(places[0], places[1], places[2]) * side.sign();
+    let lift = |p: Vec3| offset_origin(p, normal) + normal * (1e-4 * world.diagonal);
+    let at = lift(places[0] * w[0] + places[1] * w[1] + places[2] * w[2]);
+    let middle = (places[0] + places[1] + places[2]) / 3.0;
+    let seen = std::array::from_fn(|i| {
+        // Just inside the corner: the corner itself often lies in a wall's plane.
+        let to = lift(places[i].lerp(middle, 0.02)) - at;
+        let length = to.length();
+        let blocked = length > 0.0 && world.bvh.occluded(&Ray { t_max: length, ..Ray::new(at, to / length) });
+        if blocked { 0.0 } else { spoken[i] }
+    });
+    normalise(seen).or_else(|| normalise(spoken))
+}

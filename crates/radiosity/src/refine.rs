@@ -1,0 +1,479 @@
+//! Finer where E bends: gather at the midpoint of an edge, compare with what its ends predict, go on where it differs.
+//!
+//! Two kinds of vertices are tested alike. The midpoint of a long edge is new; in finely tessellated surface, where
+//! one site speaks for many vertices, the one furthest from its site is. A tested vertex stays a site in either case.
+
+use crate::element::cluster::{self, distance2};
+use crate::element::{EdgeMarks, Elements, Side, VertexId, slot};
+use crate::field::{Field, Site};
+use crate::flags::{Flags, visible_weights};
+use crate::gather::{self, Origin};
+use crate::reach::Reach;
+use crate::solve::{Config, Progress};
+use crate::solver::{self, Convergence};
+use crate::transport::{Landing, Transport};
+use geometry::math::offset_origin;
+use geometry::sampling::Lattice2;
+use geometry::{Ray, Rgb, World, triangle};
+use rayon::prelude::*;
+use std::collections::HashMap;
+
+/// A midpoint this far (relative) from its prediction, at the finest mesh, marks its surroundings for a gather of
+/// their own in pass 2.
+const ROUGH: f32 = 0.15;
+/// Origins that one vertex's rays are shared among, at most.
+const FACETS: usize = 16;
+/// A gather ray starts this share of the way from its vertex into a facet: a vertex in the corner of a room lies on
+/// the walls, and a ray from there may start on the wrong side of one.
+const INWARD: f32 = 0.02;
+
+/// The element mesh with everything gathered on it.
+pub(crate) struct Refiner<'a> {
+    world: &'a World,
+    config: &'a Config,
+    progress: &'a dyn Progress,
+    pub(crate) elements: Elements,
+    pub(crate) reach: Reach,
+    pub(crate) field: Field,
+    /// E at the sites, lx.
+    pub(crate) e: Vec<Rgb>,
+    /// Vertices whose surroundings the mesh does not resolve.
+    pub(crate) unresolved: Vec<VertexId>,
+    /// Longest edge of the first mesh, m.
+    h0: f32,
+    /// Shortest edge worth splitting to, m.
+    h_min: f32,
+    /// Reach of a site in finely tessellated surface, m.
+    radius: f32,
+}
+
+/// A vertex gathered to be compared with a prediction.
+struct Test {
+    vertex: VertexId,
+    /// What predicted it: vertices and their weights.
+    from: Vec<(VertexId, f32)>,
+    /// Length of surface that the prediction stands for, m.
+    length: f32,
+    /// Something stands between the predictors.
+    parted: bool,
+}
+
+impl<'a> Refiner<'a> {
+    /// The first mesh: no edge longer than h0, sites where clusters of vertices need them, all gathered.
+    pub(crate) fn start(world: &'a World, config: &'a Config, progress: &'a dyn Progress) -> Refiner<'a> {
+        let scale = world.diagonal;
+        let (h0, h_min, radius) = (config.h0 * scale, config.h_min * scale, config.cluster_radius * scale);
+        let mut elements = Elements::new(&world.scene.mesh);
+        let most = config.most_vertices.max(2 * elements.vertices.len());
+        elements.split_longer_than(h0, most);
+        let reach = Reach::explore(world, &elements, config.seed);
+        let mut refiner = Refiner {
+            world,
+            config,
+            progress,
+            elements,
+            reach,
+            field: Field::default(),
+            e: Vec::new(),
+            unresolved: Vec::new(),
+            h0,
+            h_min,
+            radius,
+        };
+        let used = refiner.used();
+        let chosen = cluster::spread_out(
+            &refiner.elements.vertices,
+            (0..used.len() as VertexId).filter(|&v| used[v as usize]),
+            radius,
+        );
+        refiner.gather(&chosen);
+        refiner
+    }
+
+    /// Tests and refines until the tolerance, the finest edge, the rounds or the time are reached.
+    pub(crate) fn refine(&mut self) {
+        self.settle();
+        let mut edges = self.edges_longer_than(self.radius.max(2.0 * self.h_min), |_| true);
+        let mut clusters = Clusters::new(self);
+        let mut parents: Vec<usize> = (0..clusters.members.len()).collect();
+        for round in 0..self.config.rounds {
+            if self.progress.stopped() || (edges.is_empty() && parents.is_empty()) {
+                break;
+            }
+            let mut tests = self.split(&edges);
+            let (members, owners) = clusters.furthest(self, &parents);
+            tests.extend(members);
+            if tests.is_empty() {
+                break;
+            }
+            let vertices: Vec<VertexId> = tests.iter().map(|t| t.vertex).collect();
+            self.gather(&vertices);
+            self.settle();
+            let values = self.field.spread(&self.e);
+            let floor = 0.1 * mean(&self.e).mean();
+            let errors: Vec<f32> = tests.iter().map(|t| self.error(t, &values, floor)).collect();
+            let failed: Vec<bool> = tests
+                .iter()
+                .zip(&errors)
+                .map(|(t, e)| {
+                    e * t.length / self.h0 > self.config.tolerance
+                        || (t.parted && t.length > 4.0 * self.h_min)
+                })
+                .collect();
+            let mut again = vec![false; self.elements.vertices.len()];
+            for (test, _) in tests.iter().zip(&failed).filter(|(_, f)| **f) {
+                again[test.vertex as usize] = true;
+            }
+            edges = self.edges_longer_than(2.0 * self.h_min, |v| again[v as usize]);
+            let mut open = vec![false; self.elements.vertices.len()];
+            if round + 1 < self.config.rounds {
+                for &(a, b) in &edges {
+                    (open[a as usize], open[b as usize]) = (true, true);
+                }
+            }
+            for (test, error) in tests.iter().zip(&errors) {
+                if *error > ROUGH && again[test.vertex as usize] && !open[test.vertex as usize] {
+                    self.unresolved.push(test.vertex);
+                }
+            }
+            parents = clusters.divide(self, &owners, &again);
+        }
+    }
+
+    /// Relative difference of what was gathered from what was predicted, the worse side.
+    fn error(&self, test: &Test, values: &[Rgb], floor: f32) -> f32 {
+        Side::BOTH
+            .iter()
+            .filter(|&&side| self.field.usable(slot(test.vertex, side)))
+            .map(|&side| {
+                let got = values[slot(test.vertex, side)];
+                let known = test.from.iter().filter(|(v, _)| self.field.usable(slot(*v, side)));
+                let (sum, weight) =
+                    known.fold((Rgb::BLACK, 0.0), |(s, w), &(v, k)| (s + values[slot(v, side)] * k, w + k));
+                if weight <= 0.0 {
+                    return 1.0; // nothing around it speaks for it
+                }
+                let predicted = sum / weight;
+                (got - predicted).map(f32::abs).mean() / (0.5 * (got + predicted).mean() + floor).max(1e-30)
+            })
+            .fold(0.0, f32::max)
+    }
+
+    /// Splits the edges; each midpoint is a test.
+    fn split(&mut self, edges: &[(VertexId, VertexId)]) -> Vec<Test> {
+        let mut marks = EdgeMarks::default();
+        let room = self.config.most_vertices.saturating_sub(self.elements.vertices.len());
+        for &(a, b) in edges.iter().take(room) {
+            marks.mark(a, b);
+        }
+        self.elements.split(&mut marks);
+        let midpoints = marks.split_edges();
+        let test = |&(a, b, m): &(VertexId, VertexId, VertexId)| Test {
+            vertex: m,
+            from: vec![(a, 0.5), (b, 0.5)],
+            length: self.elements.vertices[a as usize]
+                .position
+                .distance(self.elements.vertices[b as usize].position),
+            parted: self.parted(a, b),
+        };
+        midpoints.par_iter().map(test).collect()
+    }
+
+    /// Whether something stands on the edge from `a` to `b`, on a side that light reaches.
+    fn parted(&self, a: VertexId, b: VertexId) -> bool {
+        let (a, b) = (&self.elements.vertices[a as usize], &self.elements.vertices[b as usize]);
+        Side::BOTH.iter().filter(|&&side| self.reach.alive(a.piece, side)).any(|&side| {
+            let lift = 1e-4 * self.world.diagonal * side.sign();
+            let (from, to) = (a.position + a.normal * lift, b.position + b.normal * lift);
+            let length = from.distance(to);
+            // The ends often lie in a wall's plane: leave them out.
+            let ray =
+                Ray { t_min: 0.01 * length, t_max: 0.99 * length, ..Ray::new(from, (to - from) / length) };
+            length > 0.0 && self.world.bvh.occluded(&ray)
+        })
+    }
+
+    /// Which vertices a leaf uses.
+    fn used(&self) -> Vec<bool> {
+        let mut used = vec![false; self.elements.vertices.len()];
+        for leaf in self.elements.leaves() {
+            for v in self.elements.nodes[leaf as usize].vertices {
+                used[v as usize] = true;
+            }
+        }
+        used
+    }
+
+    /// Edges of leaves that are longer than `length` and have an end that `wanted` names; each once, in order.
+    fn edges_longer_than(&self, length: f32, wanted: impl Fn(VertexId) -> bool) -> Vec<(VertexId, VertexId)> {
+        let mut edges = Vec::new();
+        for leaf in self.elements.leaves() {
+            let node = &self.elements.nodes[leaf as usize];
+            let corners = self.elements.corners(leaf);
+            let piece = self.elements.vertices[node.vertices[0] as usize].piece;
+            if !Side::BOTH.iter().any(|&side| self.reach.alive(piece, side)) {
+                continue;
+            }
+            for e in 0..3 {
+                let (a, b) = (node.vertices[e], node.vertices[(e + 1) % 3]);
+                if (wanted(a) || wanted(b)) && corners[e].distance(corners[(e + 1) % 3]) > length {
+                    edges.push((a.min(b), a.max(b)));
+                }
+            }
+        }
+        edges.sort_unstable();
+        edges.dedup();
+        edges
+    }
+
+    /// Gathers at both sides, as far as light reaches them, of `vertices`; connects the field anew.
+    fn gather(&mut self, vertices: &[VertexId]) {
+        let origins = self.origins(vertices);
+        let jobs: Vec<(VertexId, Side)> = vertices
+            .iter()
+            .flat_map(|&v| Side::BOTH.map(|side| (v, side)))
+            .filter(|&(v, side)| self.reach.alive(self.elements.vertices[v as usize].piece, side))
+            .filter(|(v, _)| origins.contains_key(v))
+            .collect();
+        let room =
+            self.config.most_landings.saturating_sub(self.field.sites.len() * self.config.rays as usize);
+        let rays = self.config.rays.min((room / jobs.len().max(1)) as u32).max(16);
+        let pattern = Lattice2::new(rays);
+        self.progress.stage("gathering", jobs.len() as u64);
+        let dead =
+            |t: u32, side: Side| self.elements.piece(t).is_none_or(|piece| !self.reach.alive(piece, side));
+        let sites: Vec<Site> = jobs
+            .par_iter()
+            .map(|&(vertex, side)| {
+                let turned = turned(&origins[&vertex], side);
+                let normal = self.elements.vertices[vertex as usize].normal * side.sign();
+                let stream = slot(vertex, side) as u64;
+                let row = gather::row(self.world, &turned, normal, &pattern, self.config.seed, stream, dead);
+                self.progress.advance(1);
+                Site { vertex, side, row }
+            })
+            .collect();
+        self.e.extend(sites.iter().map(|s| s.row.direct));
+        self.field.sites.extend(sites);
+        self.field.connect(self.world, &self.elements, self.radius);
+    }
+
+    /// For each of `vertices`, points just inside the facets around it.
+    fn origins(&self, vertices: &[VertexId]) -> HashMap<VertexId, Vec<Origin>> {
+        let mut wanted = vec![false; self.elements.vertices.len()];
+        for &v in vertices {
+            wanted[v as usize] = true;
+        }
+        let mut origins: HashMap<VertexId, Vec<Origin>> = HashMap::new();
+        for leaf in self.elements.leaves() {
+            let corners = self.elements.corners(leaf);
+            for (k, v) in self.elements.nodes[leaf as usize].vertices.into_iter().enumerate() {
+                if !wanted[v as usize] {
+                    continue;
+                }
+                let around = origins.entry(v).or_default();
+                if around.len() < FACETS {
+                    let [a, b, c] = [corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]];
+                    let position = a + ((b - a) + (c - a)) * INWARD;
+                    around.push(Origin { position, ng: triangle::normal(a, b, c) });
+                }
+            }
+        }
+        origins
+    }
+
+    /// Solves on what there is, roughly: for predictions, not for pictures.
+    fn settle(&mut self) {
+        let tolerance = 0.02 * mean(&self.e).mean();
+        self.e = self.solved(tolerance, 12, &[], &Flags::default()).0;
+    }
+
+    /// Solves E = D + K (E + extra) to `tolerance` lx from the present E, in at most `most` steps; also ‖K‖∞.
+    pub(crate) fn solved(
+        &self,
+        tolerance: f32,
+        most: u32,
+        extra: &[Rgb],
+        flags: &Flags,
+    ) -> (Vec<Rgb>, Convergence, f32) {
+        let usable = |s: usize| self.field.usable(s);
+        let transport = Transport::locate(&self.elements, &self.field, |node, side, w| {
+            visible_weights(self.world, &self.elements, flags, usable, node, side, w)
+        });
+        let norm = transport.norm();
+        let (e, convergence) =
+            solver::solve(self.e.clone(), norm, tolerance, most, |e| transport.apply(e, extra));
+        (e, convergence, norm)
+    }
+
+    /// Where pass 2 should gather for itself.
+    pub(crate) fn flags(&self) -> Flags {
+        let mut unresolved = vec![false; self.elements.vertices.len()];
+        for &v in &self.unresolved {
+            unresolved[v as usize] = true;
+        }
+        Flags::collect(&self.elements, |n, side| {
+            let corners = self.elements.nodes[n as usize].vertices;
+            if !self.reach.alive(self.elements.vertices[corners[0] as usize].piece, side) {
+                return (false, false);
+            }
+            let coarse = corners.iter().any(|&v| unresolved[v as usize] || !self.field.usable(slot(v, side)));
+            (self.pierced(n, side), coarse)
+        })
+    }
+
+    /// Whether something stands across a leaf: a segment along an edge, just inside and just above, meets it.
+    fn pierced(&self, node: u32, side: Side) -> bool {
+        let corners = self.elements.corners(node);
+        let normal = triangle::normal(corners[0], corners[1], corners[2]) * side.sign();
+        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let inside = corners
+            .map(|p| offset_origin(p.lerp(middle, INWARD), normal) + normal * (1e-4 * self.world.diagonal));
+        (0..3).any(|e| {
+            let (from, to) = (inside[e], inside[(e + 1) % 3]);
+            let length = from.distance(to);
+            length > self.h_min
+                && self.world.bvh.occluded(&Ray { t_max: length, ..Ray::new(from, (to - from) / length) })
+        })
+    }
+
+    /// Direct irradiance at every slot, lx: `samples` light samples at each site.
+    pub(crate) fn direct(&self, samples: u32) -> Vec<Rgb> {
+        let vertices: Vec<VertexId> = self.field.sites.iter().map(|s| s.vertex).collect();
+        let origins = self.origins(&vertices);
+        let at_sites: Vec<Rgb> = self
+            .field
+            .sites
+            .par_iter()
+            .map(|site| {
+                let v = &self.elements.vertices[site.vertex as usize];
+                let Some(origins) = origins.get(&site.vertex) else { return Rgb::BLACK };
+                let turned = turned(origins, site.side);
+                let stream = slot(site.vertex, site.side) as u64;
+                gather::direct(
+                    self.world,
+                    &turned,
+                    v.normal * site.side.sign(),
+                    samples,
+                    self.config.seed,
+                    stream,
+                )
+            })
+            .collect();
+        self.field.spread(&at_sites)
+    }
+
+    /// Reflected shares that landed in all, for the report.
+    pub(crate) fn landings(&self) -> usize {
+        self.field.sites.iter().map(|s| s.row.landings.len()).sum::<usize>()
+    }
+
+    /// Bytes held by rows.
+    pub(crate) fn row_bytes(&self) -> usize {
+        self.landings() * size_of::<Landing>()
+    }
+}
+
+/// The origins seen from `side`.
+fn turned(origins: &[Origin], side: Side) -> Vec<Origin> {
+    origins.iter().map(|o| Origin { ng: o.ng * side.sign(), ..*o }).collect()
+}
+
+/// Mean over sites, lx.
+pub(crate) fn mean(e: &[Rgb]) -> Rgb {
+    let sum = e
+        .iter()
+        .fold([0f64; 3], |s, e| [s[0] + f64::from(e.r), s[1] + f64::from(e.g), s[2] + f64::from(e.b)]);
+    Rgb::from(sum.map(|s| (s / e.len().max(1) as f64) as f32))
+}
+
+/// Vertices without a site of their own, by the site that speaks for them.
+struct Clusters {
+    /// The vertex of the site, and those that it speaks for.
+    members: Vec<(VertexId, Vec<VertexId>)>,
+}
+
+impl Clusters {
+    fn new(refiner: &Refiner) -> Clusters {
+        let vertices = &refiner.elements.vertices;
+        let used = refiner.used();
+        let mut cluster_of = vec![usize::MAX; vertices.len()];
+        let mut members: Vec<(VertexId, Vec<VertexId>)> = Vec::new();
+        let mut grid = cluster::Grid::new(refiner.radius);
+        for site in &refiner.field.sites {
+            if cluster_of[site.vertex as usize] == usize::MAX {
+                cluster_of[site.vertex as usize] = members.len();
+                members.push((site.vertex, Vec::new()));
+                grid.insert(vertices, site.vertex);
+            }
+        }
+        let owners: Vec<Option<VertexId>> = (0..vertices.len())
+            .into_par_iter()
+            .map(|v| {
+                let open = used[v] && cluster_of[v] == usize::MAX;
+                open.then(|| {
+                    grid.near(vertices, &vertices[v]).min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)))
+                })
+                .flatten()
+                .map(|(owner, _)| owner)
+            })
+            .collect();
+        for (v, owner) in owners.into_iter().enumerate() {
+            if let Some(owner) = owner {
+                members[cluster_of[owner as usize]].1.push(v as VertexId);
+            }
+        }
+        Clusters { members }
+    }
+
+    /// From each of the clusters `which`, the member furthest from the site: tests, and the cluster of each.
+    fn furthest(&self, refiner: &Refiner, which: &[usize]) -> (Vec<Test>, Vec<(usize, VertexId)>) {
+        let vertices = &refiner.elements.vertices;
+        let least = 2.0 * refiner.h_min / refiner.radius;
+        let found: Vec<(usize, VertexId, f32)> = which
+            .par_iter()
+            .filter_map(|&c| {
+                let (site, members) = &self.members[c];
+                let far = |&v: &VertexId| {
+                    (v, distance2(&vertices[v as usize], &vertices[*site as usize], refiner.radius))
+                };
+                let (v, d2) =
+                    members.iter().map(far).max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))?;
+                (d2.sqrt() > least).then_some((c, v, d2.sqrt()))
+            })
+            .collect();
+        let tests = found
+            .iter()
+            .map(|&(c, vertex, d)| Test {
+                vertex,
+                from: vec![(self.members[c].0, 1.0)],
+                length: 2.0 * d * refiner.radius,
+                parted: false,
+            })
+            .collect();
+        (tests, found.iter().map(|&(c, v, _)| (c, v)).collect())
+    }
+
+    /// Gives every tested vertex a cluster of its own with the members nearer to it; returns the clusters whose test failed.
+    fn divide(&mut self, refiner: &Refiner, tested: &[(usize, VertexId)], failed: &[bool]) -> Vec<usize> {
+        let vertices = &refiner.elements.vertices;
+        let mut open = Vec::new();
+        for &(c, t) in tested {
+            let site = self.members[c].0;
+            let all = std::mem::take(&mut self.members[c].1);
+            let nearer = |v: VertexId| {
+                let at = &vertices[v as usize];
+                distance2(at, &vertices[t as usize], refiner.radius)
+                    < distance2(at, &vertices[site as usize], refiner.radius)
+            };
+            let (taken, kept): (Vec<_>, Vec<_>) =
+                all.into_iter().filter(|&v| v != t).partition(|&v| nearer(v));
+            self.members[c].1 = kept;
+            self.members.push((t, taken));
+            if failed[t as usize] {
+                open.extend([c, self.members.len() - 1]);
+            }
+        }
+        open
+    }
+}

@@ -1,0 +1,196 @@
+//! E at vertices and anywhere between, and what the solve reports.
+
+use crate::caustic::Caustics;
+use crate::element::{Elements, Side, slot};
+use crate::flags::{Flags, visible_weights};
+use crate::refine::Refiner;
+use crate::solver::Convergence;
+use geometry::{Hit, Ray, Rgb, Surface, Vec3, World};
+use rayon::prelude::*;
+
+/// The solved prepass: indirect irradiance everywhere on the scene's surfaces. It belongs to the world it was solved for.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    elements: Elements,
+    /// Indirect irradiance at each slot, lx; zero where a slot is not usable.
+    values: Vec<Rgb>,
+    usable: Vec<bool>,
+    flags: Flags,
+    /// Direct irradiance at each slot, lx: for the `vertex` mode and for baking.
+    direct: Vec<Rgb>,
+    /// Photons' irradiance at each slot, lx; empty when there are none.
+    caustic_values: Vec<Rgb>,
+    /// Light by way of mirrors and glass alone.
+    pub caustics: Caustics,
+    /// How the solve went.
+    pub report: Report,
+}
+
+/// How a solve went.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Report {
+    /// Vertices of the element mesh.
+    pub vertices: usize,
+    /// Leaves of the element mesh.
+    pub elements: usize,
+    /// Sides of vertices where rays were gathered.
+    pub sites: usize,
+    /// Gather rays that landed on a diffuse surface.
+    pub landings: usize,
+    /// Bytes of the rows.
+    pub row_bytes: usize,
+    /// How the iteration ended.
+    pub convergence: Convergence,
+    /// Largest row sum: the share of an error that one bounce keeps at most.
+    pub norm: f32,
+    /// Mean indirect irradiance over sites, lx.
+    pub mean: Rgb,
+    /// Light that arrives indirectly over light that surfaces send out and that does not escape: 1 when energy is kept.
+    pub balance: f32,
+    /// Leaf sides where pass 2 gathers for itself, as a share of all.
+    pub flagged: f32,
+    /// Photons kept.
+    pub photons: usize,
+    /// Light that photons brought, lm.
+    pub caustic_flux: Rgb,
+}
+
+impl Report {
+    pub(crate) fn new(
+        world: &World,
+        refiner: &Refiner,
+        flags: &Flags,
+        extra: &[Rgb],
+        direct: &[Rgb],
+        convergence: Convergence,
+        norm: f32,
+        caustics: &Caustics,
+    ) -> Report {
+        let elements = &refiner.elements;
+        Report {
+            vertices: elements.vertices.len(),
+            elements: elements.leaves().count(),
+            sites: refiner.field.sites.len(),
+            landings: refiner.landings(),
+            row_bytes: refiner.row_bytes(),
+            convergence,
+            norm,
+            mean: crate::refine::mean(&refiner.e),
+            balance: balance(world, refiner, extra, direct),
+            flagged: flags.share(),
+            photons: caustics.len(),
+            caustic_flux: caustics.flux(),
+        }
+    }
+}
+
+/// Σ A E over Σ A ρ (E + D + C) (1 − escaped): what arrives indirectly, over what leaves and stays in the scene.
+fn balance(world: &World, refiner: &Refiner, extra: &[Rgb], direct: &[Rgb]) -> f32 {
+    let (elements, field) = (&refiner.elements, &refiner.field);
+    let e = field.spread(&refiner.e);
+    let kept: Vec<Rgb> = field.sites.iter().map(|s| Rgb::splat(s.row.kept)).collect();
+    let kept = field.spread(&kept);
+    let (mut arrived, mut left) = (0f64, 0f64);
+    elements.visit_leaves(world.scene.mesh.triangles.len() as u32, |leaf, t, [u, v]| {
+        let [a, b, c] = elements.corners(leaf);
+        let area = geometry::triangle::area(a, b, c);
+        let n = world.scene.mesh.geometric_normal(t);
+        for side in Side::BOTH {
+            let piece = elements.vertices[elements.nodes[leaf as usize].vertices[0] as usize].piece;
+            if !refiner.reach.alive(piece, side) {
+                continue;
+            }
+            let n = n * side.sign();
+            let ray = Ray::new((a + b + c) / 3.0 + n, -n);
+            let surface = Surface::new(&world.scene, &ray, &Hit { t: 1.0, triangle: t, u, v });
+            let rho = surface.bsdf.diffuse_reflectance();
+            for v in elements.nodes[leaf as usize].vertices {
+                let s = slot(v, side);
+                if !field.usable(s) {
+                    continue;
+                }
+                let c = extra.get(s).copied().unwrap_or(Rgb::BLACK);
+                let weight = f64::from(area / 3.0);
+                arrived += weight * f64::from(e[s].mean());
+                left += weight * f64::from((rho * (e[s] + direct[s] + c)).mean() * kept[s].r);
+            }
+        }
+    });
+    if left > 0.0 { (arrived / left) as f32 } else { 1.0 }
+}
+
+impl Solution {
+    pub(crate) fn new(
+        refiner: Refiner,
+        flags: Flags,
+        extra: Vec<Rgb>,
+        direct: Vec<Rgb>,
+        caustics: Caustics,
+        report: Report,
+    ) -> Solution {
+        let values = refiner.field.spread(&refiner.e);
+        let usable = (0..refiner.field.slots()).into_par_iter().map(|s| refiner.field.usable(s)).collect();
+        Solution {
+            elements: refiner.elements,
+            values,
+            usable,
+            flags,
+            direct,
+            caustic_values: extra,
+            caustics,
+            report,
+        }
+    }
+
+    /// Indirect irradiance (lx) at barycentric (u, v) of scene triangle `triangle`, on one side: light that has left
+    /// at least one diffuse surface.
+    pub fn irradiance(&self, world: &World, triangle: u32, u: f32, v: f32, side: Side) -> Rgb {
+        self.interpolate(world, triangle, u, v, side, &self.values)
+    }
+
+    /// Irradiance (lx) straight from the emitters, as the vertices know it: shadows as coarse as the mesh.
+    pub fn direct(&self, world: &World, triangle: u32, u: f32, v: f32, side: Side) -> Rgb {
+        self.interpolate(world, triangle, u, v, side, &self.direct)
+    }
+
+    /// Irradiance (lx) by photons, as the vertices know it.
+    pub fn caustic(&self, world: &World, triangle: u32, u: f32, v: f32, side: Side) -> Rgb {
+        if self.caustic_values.is_empty() {
+            return Rgb::BLACK;
+        }
+        self.interpolate(world, triangle, u, v, side, &self.caustic_values)
+    }
+
+    /// Whether the mesh does not resolve the light at this place, and the one who asks should gather for itself.
+    pub fn unresolved(&self, triangle: u32, u: f32, v: f32, side: Side) -> bool {
+        let (node, _) = self.elements.locate(triangle, u, v);
+        self.flags.any(node, side)
+    }
+
+    fn interpolate(&self, world: &World, triangle: u32, u: f32, v: f32, side: Side, values: &[Rgb]) -> Rgb {
+        if self.elements.piece(triangle).is_none() {
+            return Rgb::BLACK;
+        }
+        let (node, w) = self.elements.locate(triangle, u, v);
+        let corners = self.elements.nodes[node as usize].vertices;
+        let usable = |s: usize| self.usable[s];
+        let Some(w) = visible_weights(world, &self.elements, &self.flags, usable, node, side, w) else {
+            return Rgb::BLACK;
+        };
+        (0..3).map(|i| values[slot(corners[i], side)] * w[i]).sum()
+    }
+
+    /// The element mesh.
+    pub fn elements(&self) -> &Elements {
+        &self.elements
+    }
+
+    /// Positions of the vertices with their indirect irradiance on `side`, for charts and tests.
+    pub fn vertices(&self, side: Side) -> impl Iterator<Item = (Vec3, Rgb)> + '_ {
+        let value = move |(v, vertex): (usize, &crate::element::Vertex)| {
+            let s = slot(v as u32, side);
+            self.usable[s].then(|| (vertex.position, self.values[s]))
+        };
+        self.elements.vertices.iter().enumerate().filter_map(value)
+    }
+}

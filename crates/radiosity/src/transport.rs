@@ -1,0 +1,147 @@
+//! E to K E: rows of form factors, as one applies them.
+//!
+//! A row belongs to a *site*, one side of one vertex where rays were gathered. Each of its entries is one ray's
+//! landing on a diffuse surface: Σ over the entries of weight · E(landing) is the light that comes back from there.
+//! The weights hold the reflectance met, so a row's sum is at most the largest reflectance in the scene.
+
+use crate::element::{Elements, Side, slot};
+use crate::field::Field;
+use geometry::Rgb;
+use half::f16;
+use rayon::prelude::*;
+
+/// Where one gather ray ended, 16 bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct Landing {
+    /// Scene triangle; the top bit is set for its back.
+    triangle: u32,
+    /// Barycentrics in units of 1/65535.
+    uv: [u16; 2],
+    /// Reflectance met, times what mirrors and glass on the way left, over the number of rays.
+    weight: [f16; 3],
+}
+
+const BACK: u32 = 1 << 31;
+
+impl Landing {
+    /// Packs a landing.
+    pub fn new(triangle: u32, side: Side, u: f32, v: f32, weight: Rgb) -> Landing {
+        let fix = |x: f32| (x.clamp(0.0, 1.0) * 65535.0) as u16;
+        Landing {
+            triangle: triangle | if side == Side::Back { BACK } else { 0 },
+            uv: [fix(u), fix(v)],
+            weight: weight.to_array().map(f16::from_f32),
+        }
+    }
+
+    /// Scene triangle and side.
+    pub fn place(&self) -> (u32, Side) {
+        (self.triangle & !BACK, if self.triangle & BACK == 0 { Side::Front } else { Side::Back })
+    }
+
+    /// Barycentrics on the scene triangle.
+    pub fn uv(&self) -> (f32, f32) {
+        (f32::from(self.uv[0]) / 65535.0, f32::from(self.uv[1]) / 65535.0)
+    }
+
+    /// The weight.
+    pub fn weight(&self) -> Rgb {
+        Rgb::from(self.weight.map(f32::from))
+    }
+}
+
+/// What one site gathered.
+#[derive(Clone, Debug, Default)]
+pub struct Row {
+    /// Irradiance that comes back from the surfaces met, of the light that emitters throw on them directly, lx.
+    pub direct: Rgb,
+    /// The rest of what comes back, as multiples of E where the rays landed.
+    pub landings: Box<[Landing]>,
+    /// Share of the rays that first met a side that light cannot reach.
+    pub dead: f32,
+    /// Share of the rays that landed; by reciprocity the share of the light that leaves here and stays in the scene.
+    pub kept: f32,
+}
+
+/// A landing found in the present element mesh: up to three slots with their weights.
+#[derive(Clone, Copy)]
+struct Located {
+    node: u32,
+    side: Side,
+    bary: [u16; 2],
+    weight: [f16; 3],
+}
+
+/// The rows of all sites over the present element mesh.
+pub struct Transport<'a> {
+    elements: &'a Elements,
+    field: &'a Field,
+    rows: Vec<Vec<Located>>,
+}
+
+impl<'a> Transport<'a> {
+    /// Finds every landing's leaf. `weights` may shift a landing's barycentrics among the corners of its leaf:
+    /// (node, side, weights) in, weights that sum to 1 out, or `None` where no corner can speak for the place.
+    pub fn locate(
+        elements: &'a Elements,
+        field: &'a Field,
+        weights: impl Fn(u32, Side, [f32; 3]) -> Option<[f32; 3]> + Sync,
+    ) -> Transport<'a> {
+        let rows = field
+            .sites
+            .par_iter()
+            .map(|site| {
+                let locate = |landing: &Landing| {
+                    let (triangle, side) = landing.place();
+                    let (u, v) = landing.uv();
+                    let (node, w) = elements.locate(triangle, u, v);
+                    let w = weights(node, side, w)?;
+                    let fix = |x: f32| (x * 65535.0 + 0.5) as u16;
+                    Some(Located { node, side, bary: [fix(w[0]), fix(w[1])], weight: landing.weight })
+                };
+                site.row.landings.iter().filter_map(locate).collect()
+            })
+            .collect();
+        Transport { elements, field, rows }
+    }
+
+    /// One more bounce: E at every site from `e` at every site, both lx: D + K (e + c), with `extra` the irradiance
+    /// c at each slot that e does not hold (caustics).
+    pub fn apply(&self, e: &[Rgb], extra: &[Rgb]) -> Vec<Rgb> {
+        let mut values = self.field.spread(e);
+        if !extra.is_empty() {
+            values.par_iter_mut().zip(extra).for_each(|(v, &c)| *v += c);
+        }
+        self.field
+            .sites
+            .par_iter()
+            .zip(&self.rows)
+            .map(|(site, row)| {
+                let mut sum = site.row.direct;
+                for landing in row {
+                    let [a, b, c] = self.elements.nodes[landing.node as usize].vertices;
+                    let (wa, wb) =
+                        (f32::from(landing.bary[0]) / 65535.0, f32::from(landing.bary[1]) / 65535.0);
+                    let value = values[slot(a, landing.side)] * wa
+                        + values[slot(b, landing.side)] * wb
+                        + values[slot(c, landing.side)] * (1.0 - wa - wb);
+                    sum += Rgb::from(landing.weight.map(f32::from)) * value;
+                }
+                sum
+            })
+            .collect()
+    }
+
+    /// The largest row sum, any channel: how much of an error one bounce keeps, at most.
+    pub fn norm(&self) -> f32 {
+        let sum = |row: &Vec<Located>| {
+            row.iter().map(|l| Rgb::from(l.weight.map(f32::from))).sum::<Rgb>().max_channel()
+        };
+        self.rows.par_iter().map(sum).reduce(|| 0.0, f32::max)
+    }
+
+    /// Landings in all rows.
+    pub fn landings(&self) -> usize {
+        self.rows.iter().map(Vec::len).sum()
+    }
+}

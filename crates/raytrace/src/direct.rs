@@ -1,0 +1,353 @@
+//! Light straight from the emitters at one point: how it is divided among them, and what comes of it.
+//!
+//! For a polygon of even radiance the unshadowed irradiance is exact (Lambert's contour integral); rays only tell
+//! the visible share of it, so a point that sees a whole lamp has no noise at all (Heitz, Hill and McGuire,
+//! "Combining Analytic Direct Illumination and Stochastic Shadows", I3D 2018).
+
+use geometry::emitter::{EmitterKind, LightSample};
+use geometry::sampling::Rng;
+use geometry::{Rgb, Surface, Vec3, World};
+
+/// Up to so many lights are looked at one by one; more are drawn from the tree.
+const FEW: usize = 32;
+/// A light that brings this share of the unshadowed light gets rays of its own; the smaller ones share some.
+const OWN: f32 = 0.04;
+
+/// How many rays to spend, and which strata this pixel takes of the pattern that its neighbours complete.
+#[derive(Clone, Copy, Debug)]
+pub struct Spend {
+    /// Shadow rays for a light that brings all of the light: 1, 4, 16 or 64.
+    pub samples: u32,
+    /// Place in the 4 × 4 block of pixels, 0 … 15.
+    pub phase: u32,
+}
+
+/// Which lights are sampled at a point, how often.
+#[derive(Debug, Default)]
+pub struct Plan {
+    /// Each with its number of samples and the probability with which it is chosen for each (1 for lights of their own).
+    entries: Vec<(u32, u32, f32)>,
+    /// Samples drawn from the lights of `pooled`, or from the tree when there are more lights than [`FEW`].
+    pool: u32,
+    tree: bool,
+}
+
+impl Plan {
+    /// Divides `samples` among the lights as they would shine on `p` with normal `n` if nothing stood between.
+    pub fn new(world: &World, p: Vec3, n: Vec3, samples: u32) -> Plan {
+        let lights = world.emitters.len();
+        if lights == 0 || samples == 0 {
+            return Plan::default();
+        }
+        if lights > FEW {
+            return Plan { entries: Vec::new(), pool: samples.max(2), tree: true };
+        }
+        let importance: Vec<f32> = (0..lights as u32).map(|l| world.emitters.importance(l, p, n)).collect();
+        let total: f32 = importance.iter().sum();
+        if total <= 0.0 {
+            return Plan::default();
+        }
+        let mut entries = Vec::new();
+        let (mut small, mut pool) = (0.0, 0);
+        for (light, &w) in importance.iter().enumerate() {
+            if w >= OWN * total {
+                // The strata come in powers of four; a light that brings a quarter of the light deserves a quarter of
+                // the rays for the same noise.
+                let share = (samples as f32 * w / total).max(1.0);
+                let own = 4u32.pow(share.log(4.0).ceil() as u32).min(samples);
+                entries.push((light as u32, own, 1.0));
+            } else {
+                small += w;
+            }
+        }
+        if small > 0.0 {
+            pool = (samples / 8).max(1);
+            for (light, &w) in importance.iter().enumerate() {
+                if w > 0.0 && w < OWN * total {
+                    entries.push((light as u32, pool, w / small));
+                }
+            }
+        }
+        Plan { entries, pool, tree: false }
+    }
+
+    /// Expected number of samples per solid angle (1/sr) toward `point` on the emissive `triangle`: what multiple
+    /// importance sampling weighs a ray that ran into it by.
+    pub fn density(&self, world: &World, p: Vec3, n: Vec3, triangle: u32, point: Vec3) -> f32 {
+        if self.tree {
+            return self.pool as f32 * world.emitters.pdf_triangle(p, n, triangle, point);
+        }
+        let Some(light) = world.emitters.light_of_triangle(triangle) else { return 0.0 };
+        let shape = match &world.emitters.lights()[light as usize] {
+            EmitterKind::Polygon(shape) | EmitterKind::Textured(shape) => shape,
+            _ => return 0.0,
+        };
+        self.times(light) * shape.pdf(p, point)
+    }
+
+    /// As [`Plan::density`], toward the sky.
+    pub fn density_sky(&self, world: &World, n: Vec3, wi: Vec3) -> f32 {
+        if self.tree {
+            return self.pool as f32 * world.emitters.pdf_sky(n, wi);
+        }
+        let lights = world.emitters.lights().iter().enumerate();
+        lights
+            .filter_map(|(l, kind)| {
+                if let EmitterKind::Sky(sky) = kind { Some(self.times(l as u32) * sky.pdf(wi)) } else { None }
+            })
+            .sum()
+    }
+
+    /// Expected samples that `light` gets.
+    fn times(&self, light: u32) -> f32 {
+        self.entries.iter().find(|e| e.0 == light).map_or(0.0, |&(_, n, q)| n as f32 * q)
+    }
+}
+
+/// Light of the emitters at a point.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Direct {
+    /// Radiance that the diffuse lobe sends on, cd/m².
+    pub diffuse: Rgb,
+    /// Radiance that the glossy lobes send on, cd/m², weighed against rays that look for it themselves.
+    pub glossy: Rgb,
+    /// Irradiance with shadows, lx.
+    pub irradiance: Rgb,
+    /// Visible share of the unshadowed irradiance, [0, 1].
+    pub visible: f32,
+    /// Estimated variance of the luminance of `diffuse`, (cd/m²)².
+    pub variance: f32,
+}
+
+/// What is asked of the glossy lobes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Gloss {
+    /// Nothing.
+    None,
+    /// All of the emitters' light through them.
+    All,
+    /// What rays through the lobes do not find better themselves: one such ray is sent.
+    Shared,
+}
+
+/// Samples the lights of `plan` from `surface` toward `wo`.
+pub fn direct(
+    world: &World,
+    surface: &Surface,
+    wo: Vec3,
+    plan: &Plan,
+    gloss: Gloss,
+    spend: Spend,
+    rng: &mut Rng,
+) -> Direct {
+    let mut out = Direct::default();
+    let mut unshadowed = 0.0;
+    if plan.tree {
+        sample_tree(world, surface, wo, plan, gloss, rng, &mut out);
+        return out;
+    }
+    let has_diffuse = surface.bsdf.has_diffuse();
+    for &(light, samples, chance) in plan.entries.iter().filter(|e| e.2 == 1.0) {
+        let kind = &world.emitters.lights()[light as usize];
+        let exact = match kind {
+            EmitterKind::Polygon(shape) => Some(shape.irradiance(surface.position, surface.ns)),
+            _ => None,
+        };
+        let samples = if matches!(kind, EmitterKind::Punctual(_)) { 1 } else { samples };
+        let mut part = Part::default();
+        for k in 0..samples {
+            let u = stratum(k, samples, spend.phase, rng);
+            let Some(s) = world.emitters.sample_light(&world.scene, light, surface.position, u) else {
+                part.count += 1;
+                continue;
+            };
+            part.add(world, surface, wo, &s, samples as f32 * chance, gloss, has_diffuse);
+        }
+        part.finish(exact, &mut out, &mut unshadowed);
+    }
+    pooled(world, surface, wo, plan, gloss, rng, &mut out, &mut unshadowed);
+    out.visible = if unshadowed > 0.0 { (out.irradiance.luminance() / unshadowed).min(1.0) } else { 1.0 };
+    out
+}
+
+/// Samples of one light.
+#[derive(Default)]
+struct Part {
+    count: u32,
+    /// Σ of the irradiance the samples stand for without and with shadows, and of the radiance sent on.
+    open: Rgb,
+    lit: Rgb,
+    diffuse: Rgb,
+    glossy: Rgb,
+    lit2: f32,
+}
+
+impl Part {
+    fn add(
+        &mut self,
+        world: &World,
+        surface: &Surface,
+        wo: Vec3,
+        s: &LightSample,
+        times: f32,
+        gloss: Gloss,
+        diffuse: bool,
+    ) {
+        self.count += 1;
+        let cos = s.wi.dot(surface.ns);
+        let above = cos > 0.0 && s.wi.dot(surface.ng) > 0.0;
+        let arriving = if above { s.radiance * (cos / s.pdf) } else { Rgb::BLACK };
+        self.open += if cos > 0.0 { s.radiance * (cos / s.pdf) } else { Rgb::BLACK };
+        let f_glossy = if gloss == Gloss::None { Rgb::BLACK } else { surface.bsdf.eval_glossy(wo, s.wi) };
+        if arriving.is_black() && f_glossy.is_black() {
+            return;
+        }
+        let open = world.transmittance(&s.shadow_ray(surface.position, surface.ng));
+        if open.is_black() {
+            return;
+        }
+        let lit = arriving * open;
+        self.lit += lit;
+        self.lit2 += lit.luminance() * lit.luminance();
+        if diffuse && above {
+            self.diffuse += surface.bsdf.eval_diffuse(wo, s.wi) * lit;
+        }
+        if !f_glossy.is_black() {
+            let weight = match gloss {
+                Gloss::Shared if !s.delta => {
+                    let light = times * s.pdf;
+                    light / (light + surface.bsdf.pdf_specular(wo, s.wi))
+                }
+                _ => 1.0,
+            };
+            self.glossy += f_glossy * open * s.radiance * (cos.abs() / s.pdf * weight);
+        }
+    }
+
+    /// Adds the light's part to `out`; with the `exact` unshadowed irradiance the samples only give ratios.
+    fn finish(&self, exact: Option<Rgb>, out: &mut Direct, unshadowed: &mut f32) {
+        if self.count == 0 {
+            return;
+        }
+        let n = self.count as f32;
+        let estimate = self.open.luminance() / n;
+        // How far the samples' own unshadowed light is off, corrected in the shadowed light too.
+        let ratio = match exact {
+            Some(e) if estimate > 0.0 => e.luminance() / estimate,
+            _ => 1.0,
+        };
+        let lit = self.lit * (ratio / n);
+        let sent = self.diffuse * (ratio / n);
+        out.irradiance += lit;
+        out.diffuse += sent;
+        out.glossy += self.glossy / n;
+        *unshadowed += estimate * ratio;
+        if let (Some(_), true) = (exact, estimate > 0.0) {
+            // Seen or not seen, as a coin with the visible share; strata leave about half of a coin's variance.
+            let v = (lit.luminance() / (estimate * ratio)).clamp(0.0, 1.0);
+            let open = sent.luminance() / v.max(0.05);
+            out.variance += 0.5 * open * open * v * (1.0 - v) / n;
+        } else if self.count > 1 {
+            let mean = self.lit.luminance() / n;
+            let spread = (self.lit2 / n - mean * mean).max(0.0) / (n - 1.0);
+            out.variance += spread * (sent.luminance() / lit.luminance().max(1e-20)).powi(2);
+        } else {
+            // One sample of a lamp without extent is exact, and one sample of anything else says nothing of its spread.
+        }
+    }
+}
+
+/// The small lights together.
+fn pooled(
+    world: &World,
+    surface: &Surface,
+    wo: Vec3,
+    plan: &Plan,
+    gloss: Gloss,
+    rng: &mut Rng,
+    out: &mut Direct,
+    unshadowed: &mut f32,
+) {
+    let small: Vec<_> = plan.entries.iter().filter(|e| e.2 < 1.0).collect();
+    if small.is_empty() {
+        return;
+    }
+    let mut part = Part::default();
+    for _ in 0..plan.pool {
+        let mut u = rng.f32();
+        let chosen = small.iter().find(|e| {
+            u -= e.2;
+            u < 0.0
+        });
+        let &&(light, _, chance) = chosen.unwrap_or(&small[small.len() - 1]);
+        match world.emitters.sample_light(&world.scene, light, surface.position, [rng.f32(), rng.f32()]) {
+            Some(s) => {
+                let s = LightSample { pdf: s.pdf * chance, ..s };
+                part.add(world, surface, wo, &s, plan.pool as f32, gloss, surface.bsdf.has_diffuse());
+            }
+            None => part.count += 1,
+        }
+    }
+    part.finish(None, out, unshadowed);
+}
+
+/// Many lights: drawn from the tree.
+fn sample_tree(
+    world: &World,
+    surface: &Surface,
+    wo: Vec3,
+    plan: &Plan,
+    gloss: Gloss,
+    rng: &mut Rng,
+    out: &mut Direct,
+) {
+    let mut part = Part::default();
+    for i in 0..plan.pool {
+        let u = [(i as f32 + rng.f32()) / plan.pool as f32, rng.f32(), rng.f32()];
+        match world.emitters.sample(&world.scene, surface.position, surface.ns, u) {
+            Some(s) => part.add(world, surface, wo, &s, plan.pool as f32, gloss, surface.bsdf.has_diffuse()),
+            None => part.count += 1,
+        }
+    }
+    let mut unshadowed = 0.0;
+    part.finish(None, out, &mut unshadowed);
+    out.visible = if unshadowed > 0.0 { (out.irradiance.luminance() / unshadowed).min(1.0) } else { 1.0 };
+}
+
+/// Sample `k` of `n` in [0, 1)²: of an 8 × 8 grid of strata this pixel takes n, spread evenly, and the 4 × 4 pixels
+/// around it take the others.
+fn stratum(k: u32, n: u32, phase: u32, rng: &mut Rng) -> [f32; 2] {
+    let (jx, jy) = (rng.f32(), rng.f32());
+    let side = match n {
+        0..=3 => return [jx, jy],
+        4..=15 => 2,
+        16..=63 => 4,
+        _ => 8,
+    };
+    // Beyond 64 the strata are visited again.
+    let k = k % (side * side);
+    let (block_x, block_y) = (k % side, k / side);
+    let inside = 8 / side;
+    let (px, py) = (phase % 4 % inside, phase / 4 % inside);
+    let x = (block_x * inside + px) as f32 + jx;
+    let y = (block_y * inside + py) as f32 + jy;
+    [(x * 0.125).min(1.0 - f32::EPSILON), (y * 0.125).min(1.0 - f32::EPSILON)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sixteen_pixels_of_four_samples_cover_all_strata() {
+        let mut seen = [false; 64];
+        let mut rng = Rng::new(1, 1);
+        for phase in 0..16 {
+            for k in 0..4 {
+                let [x, y] = stratum(k, 4, phase, &mut rng);
+                seen[(x * 8.0) as usize + 8 * (y * 8.0) as usize] = true;
+            }
+        }
+        assert!(seen.iter().all(|&s| s));
+    }
+}

@@ -1,0 +1,323 @@
+//! The two-pass method: what the eye sees of a diffuse surface comes from the solution, everything else by rays.
+//!
+//! In Heckbert's letters, from light to eye: `L D E` by shadow rays, `L (D|S)* D E` from the vertices, `L S+ D E`
+//! from the photons, and any of them seen through `S+` by following mirror, glass and glossy rays to the first
+//! diffuse surface. Each path is counted once: a glossy ray that runs into a lamp is weighed against the shadow
+//! rays that looked for the same light.
+
+use super::Layers;
+use crate::direct::{Direct, Gloss, Plan, Spend, direct};
+use crate::render::DiffuseMode;
+use geometry::bsdf::BsdfSample;
+use geometry::math::{offset_origin, to_world};
+use geometry::sampling::{Lattice2, Rng, cosine_hemisphere};
+use geometry::{Ray, Rgb, Surface, Vec3, World, optics, photometry};
+use radiosity::Solution;
+use radiosity::element::Side;
+use radiosity::gather::{self, ROUGH};
+
+/// Rays of less weight than this live on by chance, in proportion.
+const CUTOFF: f32 = 0.02;
+/// Surfaces one ray tree passes at most.
+const DEEPEST: u32 = 48;
+/// Both of a glass surface's rays are followed down to this depth, then one by chance.
+const BRANCHING: u32 = 6;
+/// A lobe as rough as [`ROUGH`] that sends on less than this is shown the surface's irradiance in place of rays:
+/// a dielectric coat is, a rough metal is not.
+const FAINT: f32 = 0.12;
+
+/// How much to spend on one surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Quality {
+    /// Shadow rays: see [`Spend`].
+    pub shadow: u32,
+    /// Whether to gather at the surface where the mode or an unresolved mesh asks for it.
+    pub gather: bool,
+}
+
+/// Shades surfaces of one world with one solution.
+#[derive(Clone, Debug)]
+pub struct Hybrid<'a> {
+    /// The world.
+    pub world: &'a World,
+    /// The prepass over it.
+    pub solution: &'a Solution,
+    /// Where a diffuse surface's light comes from.
+    pub mode: DiffuseMode,
+    /// Rays of a gather for one pixel.
+    pub pattern: Lattice2,
+}
+
+/// Diffuse light of one surface toward the eye.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Diffuse {
+    /// Light of emitters, cd/m².
+    pub direct: Rgb,
+    /// Light by way of other surfaces, cd/m².
+    pub indirect: Rgb,
+    /// Emitters' light through the glossy lobes, cd/m².
+    pub glossy: Rgb,
+    /// All irradiance, lx.
+    pub irradiance: Rgb,
+    /// Visible share of the unshadowed direct light.
+    pub visible: f32,
+    /// Estimated variance of the luminance.
+    pub variance: f32,
+}
+
+impl Hybrid<'_> {
+    /// The diffuse part of `surface`, and the lamps in its glossy lobes.
+    pub fn diffuse(
+        &self,
+        surface: &Surface,
+        wo: Vec3,
+        quality: Quality,
+        phase: u32,
+        rng: &mut Rng,
+    ) -> (Diffuse, Plan) {
+        let plan = Plan::new(self.world, surface.position, surface.ns, quality.shadow);
+        let gloss = gloss_of(surface, wo);
+        let has_diffuse = surface.bsdf.has_diffuse();
+        let from_vertices = self.mode == DiffuseMode::Vertex && has_diffuse;
+        let lit = if from_vertices && gloss == Gloss::None {
+            Direct { visible: 1.0, ..Direct::default() }
+        } else if has_diffuse || gloss != Gloss::None {
+            direct(self.world, surface, wo, &plan, gloss, Spend { samples: quality.shadow, phase }, rng)
+        } else {
+            Direct { visible: 1.0, ..Direct::default() }
+        };
+        let mut out = Diffuse {
+            direct: lit.diffuse,
+            glossy: lit.glossy,
+            irradiance: lit.irradiance,
+            visible: lit.visible,
+            variance: lit.variance,
+            ..Diffuse::default()
+        };
+        let quasi = quasi_diffuse(surface, wo);
+        if !has_diffuse && quasi.is_black() {
+            return (out, plan);
+        }
+        let side = Side::met(surface.front);
+        let (t, u, v) = (surface.triangle, surface.u, surface.v);
+        let albedo = surface.bsdf.diffuse_albedo(wo);
+        if from_vertices {
+            let e = self.solution.direct(self.world, t, u, v, side);
+            out.direct = photometry::reflected_radiance(albedo, e);
+            out.irradiance = e;
+            out.variance = 0.0;
+        }
+        let gathers = match self.mode {
+            DiffuseMode::Vertex => false,
+            DiffuseMode::Split => quality.gather && self.solution.unresolved(t, u, v, side),
+            DiffuseMode::Gather => quality.gather,
+        };
+        let mut e = if gathers {
+            let (e, variance) = self.gather(surface, rng);
+            out.variance += variance * photometry::reflected_radiance(albedo, Rgb::WHITE).luminance().powi(2);
+            e
+        } else {
+            self.solution.irradiance(self.world, t, u, v, side)
+        };
+        e += if from_vertices {
+            self.solution.caustic(self.world, t, u, v, side)
+        } else {
+            self.solution.caustics.irradiance(surface.position, surface.ng)
+        };
+        out.indirect = photometry::reflected_radiance(albedo + quasi, e);
+        out.irradiance += e;
+        (out, plan)
+    }
+
+    /// Indirect irradiance by a gather of rays that read the solution where they end, lx, and the variance of
+    /// its luminance.
+    fn gather(&self, surface: &Surface, rng: &mut Rng) -> (Rgb, f32) {
+        let shift = rng.vec2();
+        let (mut sum, mut square) = (Rgb::BLACK, 0.0);
+        for i in 0..self.pattern.len() {
+            let wi = to_world(cosine_hemisphere(self.pattern.point(i, shift)), surface.ns);
+            if wi.dot(surface.ng) <= 0.0 {
+                continue;
+            }
+            let ray = Ray::new(offset_origin(surface.position, surface.ng), wi);
+            let mut reflected = Rgb::BLACK;
+            let followed = gather::follow(self.world, ray, rng, |hit, side, weight| {
+                let e = self.solution.irradiance(self.world, hit.triangle, hit.u, hit.v, side)
+                    + self.solution.caustic(self.world, hit.triangle, hit.u, hit.v, side);
+                reflected = weight * e;
+            });
+            let brought = followed.direct + reflected;
+            sum += brought;
+            square += brought.luminance() * brought.luminance();
+        }
+        let n = self.pattern.len() as f32;
+        let mean = sum / n;
+        let spread = (square / n - mean.luminance() * mean.luminance()).max(0.0);
+        (mean, 0.5 * spread / n) // a lattice leaves about half of independent rays' variance
+    }
+
+    /// What mirrors, glass and gloss of `surface` show toward `wo`, cd/m², by following one ray for each perfect lobe or
+    /// one for a glossy one.
+    ///
+    /// - `plan`: the lights that shadow rays at `surface` looked for.
+    /// - `weight`: share of the pixel's light that comes through here, [0, 1].
+    pub fn specular(
+        &self,
+        surface: &Surface,
+        wo: Vec3,
+        plan: &Plan,
+        weight: f32,
+        depth: u32,
+        rng: &mut Rng,
+    ) -> Rgb {
+        if !surface.bsdf.has_specular() || depth >= DEEPEST || !quasi_diffuse(surface, wo).is_black() {
+            return Rgb::BLACK;
+        }
+        if !surface.bsdf.is_delta() {
+            let u = [rng.f32(), rng.f32(), rng.f32()];
+            let Some(next) = surface.bsdf.sample_specular(wo, u) else { return Rgb::BLACK };
+            let from = (!next.delta).then_some(From {
+                position: surface.position,
+                normal: surface.ns,
+                plan,
+                pdf: next.pdf,
+            });
+            return self.follow(surface, &next, weight, depth, from.as_ref(), rng);
+        }
+        if depth < BRANCHING {
+            let lobes = surface.bsdf.delta_lobes(wo);
+            return lobes
+                .into_iter()
+                .flatten()
+                .map(|next| self.follow(surface, &next, weight, depth, None, rng))
+                .sum();
+        }
+        let u = [rng.f32(), rng.f32(), rng.f32()];
+        match surface.bsdf.sample_specular(wo, u) {
+            Some(next) => self.follow(surface, &next, weight, depth, None, rng),
+            None => Rgb::BLACK,
+        }
+    }
+
+    /// One specular ray onward; ends it by chance when little hangs on it.
+    fn follow(
+        &self,
+        surface: &Surface,
+        next: &BsdfSample,
+        weight: f32,
+        depth: u32,
+        from: Option<&From>,
+        rng: &mut Rng,
+    ) -> Rgb {
+        let mut scale = next.weight;
+        let mut weight = weight * scale.max_channel();
+        if weight < CUTOFF {
+            let live = (weight / CUTOFF).max(0.05);
+            if rng.f32() >= live {
+                return Rgb::BLACK;
+            }
+            scale *= 1.0 / live;
+            weight = CUTOFF;
+        }
+        let away = if next.wi.dot(surface.ng) > 0.0 { surface.ng } else { -surface.ng };
+        let ray = Ray::new(offset_origin(surface.position, away), next.wi);
+        scale * self.incoming(ray, weight.min(1.0), depth + 1, from, rng)
+    }
+
+    /// Radiance that arrives along `ray`, cd/m².
+    fn incoming(&self, ray: Ray, weight: f32, depth: u32, from: Option<&From>, rng: &mut Rng) -> Rgb {
+        let Some(hit) = self.world.closest(&ray) else {
+            let Some(sky) = &self.world.scene.sky else { return Rgb::BLACK };
+            let share = from
+                .map_or(1.0, |f| f.pdf / (f.pdf + f.plan.density_sky(self.world, f.normal, ray.direction)));
+            return sky.radiance(ray.direction) * share;
+        };
+        let surface = Surface::new(&self.world.scene, &ray, &hit);
+        let left = match surface.interior() {
+            Some(v) => optics::attenuation(v.attenuation_color, v.attenuation_distance, hit.t),
+            None => Rgb::WHITE,
+        };
+        let mut sum = Rgb::BLACK;
+        if surface.coverage < 1.0 && depth < DEEPEST {
+            let through = weight * (1.0 - surface.coverage);
+            let onward = Ray::new(offset_origin(surface.position, -surface.ng), ray.direction);
+            if through > 1e-3 {
+                sum += self.incoming(onward, through, depth + 1, from, rng) * (1.0 - surface.coverage);
+            }
+        }
+        if surface.coverage > 0.0 {
+            let share = match from {
+                Some(f) if !surface.emission.is_black() => {
+                    let light =
+                        f.plan.density(self.world, f.position, f.normal, hit.triangle, surface.position);
+                    f.pdf / (f.pdf + light)
+                }
+                _ => 1.0,
+            };
+            let here = surface.emission * share + self.surface(&surface, -ray.direction, weight, depth, rng);
+            sum += here * surface.coverage;
+        }
+        left * sum
+    }
+
+    /// Light that a surface met by a specular ray sends back, its own emission left out.
+    fn surface(&self, surface: &Surface, wo: Vec3, weight: f32, depth: u32, rng: &mut Rng) -> Rgb {
+        if let Some(shown) = surface.unlit {
+            return shown;
+        }
+        let shadow = if weight > 0.25 { 4 } else { 1 };
+        let phase = (rng.f32() * 16.0) as u32;
+        let (diffuse, plan) = self.diffuse(surface, wo, Quality { shadow, gather: false }, phase, rng);
+        diffuse.direct
+            + diffuse.indirect
+            + diffuse.glossy
+            + self.specular(surface, wo, &plan, weight, depth, rng)
+    }
+
+    /// What the eye gets of one primary surface besides its diffuse part: emission as such, and the ray tree.
+    pub fn beside_diffuse(&self, surface: &Surface, ray: &Ray, plan: &Plan, rng: &mut Rng) -> Layers {
+        let wo = -ray.direction;
+        let mut out = Layers { emission: surface.emission, ..Layers::default() };
+        if let Some(shown) = surface.unlit {
+            out.emission += shown;
+        } else {
+            out.specular = self.specular(surface, wo, plan, 1.0, 0, rng);
+        }
+        if surface.coverage < 1.0 {
+            let onward = Ray::new(offset_origin(surface.position, -surface.ng), ray.direction);
+            let through = 1.0 - surface.coverage;
+            out.emission *= surface.coverage;
+            out.specular =
+                out.specular * surface.coverage + self.incoming(onward, through, 1, None, rng) * through;
+        }
+        out
+    }
+}
+
+/// Where a glossy ray came from, for weighing it against shadow rays.
+struct From<'a> {
+    position: Vec3,
+    normal: Vec3,
+    plan: &'a Plan,
+    pdf: f32,
+}
+
+/// What shadow rays at `surface` do for its glossy lobes.
+fn gloss_of(surface: &Surface, wo: Vec3) -> Gloss {
+    if !surface.bsdf.has_specular() || surface.bsdf.is_delta() {
+        Gloss::None
+    } else if quasi_diffuse(surface, wo).is_black() {
+        Gloss::Shared
+    } else {
+        Gloss::All
+    }
+}
+
+/// Directional albedo of a lobe so rough and faint that it is shown the diffuse irradiance; black for others.
+fn quasi_diffuse(surface: &Surface, wo: Vec3) -> Rgb {
+    if !surface.bsdf.has_specular() || surface.bsdf.glossy_roughness() < ROUGH {
+        return Rgb::BLACK;
+    }
+    let albedo = surface.bsdf.specular_albedo(wo);
+    if albedo.max_channel() < FAINT { albedo } else { Rgb::BLACK }
+}

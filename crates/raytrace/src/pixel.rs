@@ -1,0 +1,259 @@
+//! One pixel of the hybrid picture: as many rays through it as it needs, each surface they find shaded once.
+
+use crate::film::Pixel;
+use crate::integrator::hybrid::{Hybrid, Quality};
+use geometry::sampling::Rng;
+use geometry::{Camera, MaterialId, Projection, Ray, Rgb, Surface, Vec3, World};
+
+/// A camera with a film behind it.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// Where from.
+    pub camera: &'a Camera,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+impl View<'_> {
+    /// The ray through film coordinates in pixels, from the top left.
+    pub fn ray(&self, x: f32, y: f32) -> Ray {
+        let (w, h) = (self.width as f32, self.height as f32);
+        self.camera.ray(x / w, y / h, w / h)
+    }
+
+    /// Side of a pixel at `depth` metres, m.
+    fn footprint(&self, depth: f32) -> f32 {
+        match self.camera.projection {
+            Projection::Perspective { yfov } => 2.0 * (0.5 * yfov).tan() * depth / self.height as f32,
+            Projection::Orthographic { ymag } => 2.0 * ymag / self.height as f32,
+        }
+    }
+}
+
+/// How much to spend on a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Effort {
+    /// Rays through it: 1 (its middle) or a square number (jittered grid).
+    pub camera: u32,
+    /// Shadow rays for each of its surfaces.
+    pub shadow: u32,
+}
+
+/// What a pixel's middle ray found, to be compared with its neighbours.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Key {
+    material: MaterialId,
+    position: Vec3,
+    normal: Vec3,
+    footprint: f32,
+}
+
+impl Key {
+    fn new(surface: &Surface, footprint: f32) -> Key {
+        Key { material: surface.material, position: surface.position, normal: surface.ng, footprint }
+    }
+
+    /// Whether two points lie on one smooth surface: same material, nearly one plane.
+    pub fn continues(&self, other: &Key) -> bool {
+        let tolerance = 2.0 * self.footprint.max(other.footprint);
+        self.material == other.material
+            && self.normal.dot(other.normal) > 0.95
+            && (other.position - self.position).dot(self.normal).abs() < tolerance
+    }
+}
+
+/// A pixel with what decides whether it gets more.
+#[derive(Clone, Copy, Debug)]
+pub struct Shot {
+    /// Its light.
+    pub pixel: Pixel,
+    /// What was spent.
+    pub effort: Effort,
+    /// What its first ray met; `None` for nothing.
+    pub key: Option<Key>,
+    /// Visible share of the direct light.
+    pub visible: f32,
+    /// Variance of the luminance from rays through the pixel: edges, textures, gloss.
+    pub camera_variance: f32,
+    /// Variance of the luminance from shadow rays and gathers.
+    pub light_variance: f32,
+    /// A texture or a gloss varies within the pixel: one ray through it does not tell.
+    pub fine: bool,
+}
+
+/// One surface seen through a pixel: hits that belong together.
+struct Group {
+    key: Key,
+    hits: Vec<usize>,
+}
+
+/// Shades pixel (x, y).
+pub fn shade(hybrid: &Hybrid, view: &View, x: u32, y: u32, effort: Effort, seed: u64) -> Shot {
+    let mut rng = Rng::new(seed ^ u64::from(effort.camera) << 40, u64::from(y) << 32 | u64::from(x));
+    let n = effort.camera;
+    let side = (n as f32).sqrt().round() as u32;
+    let mut hits: Vec<(Ray, Surface)> = Vec::with_capacity(n as usize);
+    let mut shot = Shot {
+        pixel: Pixel { samples: n, ..Pixel::default() },
+        effort,
+        key: None,
+        visible: 1.0,
+        camera_variance: 0.0,
+        light_variance: 0.0,
+        fine: false,
+    };
+    let mut sky = Rgb::BLACK;
+    for i in 0..n {
+        let (jx, jy) = if n == 1 { (0.5, 0.5) } else { (rng.f32(), rng.f32()) };
+        let fx = x as f32 + ((i % side) as f32 + jx) / side as f32;
+        let fy = y as f32 + ((i / side) as f32 + jy) / side as f32;
+        let ray = view.ray(fx, fy);
+        match first_surface(hybrid.world, ray) {
+            Some(found) => hits.push(found),
+            None => sky += hybrid.world.scene.sky.as_ref().map_or(Rgb::BLACK, |s| s.radiance(ray.direction)),
+        }
+    }
+    let share = 1.0 / n as f32;
+    shot.pixel.emission = sky * share;
+    shot.pixel.alpha = hits.len() as f32 * share;
+    let groups = group(&hits, view);
+    let mut levels: Vec<(f32, f32)> = Vec::with_capacity(groups.len() + 1); // share and luminance of each surface
+    if hits.len() < n as usize {
+        let missed = n as usize - hits.len();
+        levels.push((missed as f32 * share, sky.luminance() / missed as f32));
+    }
+    let mut largest = 0;
+    for g in &groups {
+        let before = shot.pixel.beauty().luminance();
+        one_surface(hybrid, g, &hits, effort, share, phase(x, y), &mut shot, &mut rng);
+        let part = g.hits.len() as f32 * share;
+        levels.push((part, (shot.pixel.beauty().luminance() - before) / part));
+        if g.hits.len() > largest {
+            largest = g.hits.len();
+            shot.pixel.position = g.key.position;
+            shot.key = Some(g.key);
+        }
+    }
+    let mean: f32 = levels.iter().map(|&(p, l)| p * l).sum();
+    let spread: f32 = levels.iter().map(|&(p, l)| p * (l - mean) * (l - mean)).sum();
+    // An edge through a jittered grid of n: the share of one side has variance ∝ n^-1.5.
+    shot.camera_variance += spread * share.powf(1.5);
+    shot.pixel.variance = shot.camera_variance + shot.light_variance;
+    shot
+}
+
+/// Place of a pixel in the 4 × 4 pattern whose members are spread as evenly as Bayer's matrix does.
+fn phase(x: u32, y: u32) -> u32 {
+    const BAYER: [u32; 16] = [0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5];
+    BAYER[(4 * (y % 4) + x % 4) as usize]
+}
+
+/// The first surface that is there: past what an alpha mask cuts out.
+fn first_surface(world: &World, mut ray: Ray) -> Option<(Ray, Surface)> {
+    for _ in 0..64 {
+        let hit = world.closest(&ray)?;
+        let surface = Surface::new(&world.scene, &ray, &hit);
+        if surface.coverage > 0.0 {
+            return Some((ray, surface));
+        }
+        ray.t_min = hit.t;
+    }
+    None
+}
+
+/// Puts hits that continue one another together.
+fn group(hits: &[(Ray, Surface)], view: &View) -> Vec<Group> {
+    let mut groups: Vec<Group> = Vec::new();
+    for (i, (ray, surface)) in hits.iter().enumerate() {
+        let depth = surface.position.distance(ray.origin);
+        let key = Key::new(surface, view.footprint(depth));
+        match groups.iter_mut().find(|g| g.key.continues(&key)) {
+            Some(g) => g.hits.push(i),
+            None => groups.push(Group { key, hits: vec![i] }),
+        }
+    }
+    groups
+}
+
+/// Adds the light of one surface: its diffuse part once, at the hit nearest its middle; its specular part for each ray.
+fn one_surface(
+    hybrid: &Hybrid,
+    g: &Group,
+    hits: &[(Ray, Surface)],
+    effort: Effort,
+    share: f32,
+    phase: u32,
+    shot: &mut Shot,
+    rng: &mut Rng,
+) {
+    let count = g.hits.len() as f32;
+    let part = count * share;
+    let middle = g.hits.iter().map(|&i| hits[i].1.position).sum::<Vec3>() / count;
+    let nearest = |&&i: &&usize| hits[i].1.position.distance_squared(middle);
+    let chosen = g.hits.iter().min_by(|a, b| nearest(a).total_cmp(&nearest(b))).copied().unwrap_or(g.hits[0]);
+    let (ray, surface) = &hits[chosen];
+    let wo = -ray.direction;
+    // A sliver of a pixel needs fewer shadow rays for the same noise in the pixel.
+    let shadow = if part < 0.3 && effort.shadow > 4 { effort.shadow / 4 } else { effort.shadow };
+    let quality = Quality { shadow, gather: true };
+    let (lit, plan) = hybrid.diffuse(surface, wo, quality, phase, rng);
+    let albedo = surface.bsdf.diffuse_albedo(wo);
+    let textured = varies(hybrid.world, surface.material);
+    let mean_albedo = if textured && g.hits.len() > 1 {
+        g.hits.iter().map(|&i| hits[i].1.bsdf.diffuse_albedo(-hits[i].0.direction)).sum::<Rgb>() / count
+    } else {
+        albedo
+    };
+    // The texture is averaged over the pixel, the light on it is not.
+    let ratio = |m: f32, a: f32| if a > 1e-4 { m / a } else { 1.0 };
+    let tint = Rgb::new(
+        ratio(mean_albedo.r, albedo.r),
+        ratio(mean_albedo.g, albedo.g),
+        ratio(mean_albedo.b, albedo.b),
+    );
+    let p = &mut shot.pixel;
+    let coverage = surface.coverage * part;
+    p.direct += lit.direct * tint * coverage;
+    p.indirect += lit.indirect * tint * coverage;
+    p.irradiance += lit.irradiance * coverage;
+    p.albedo += mean_albedo * part;
+    let (mut sum, mut square) = (Rgb::BLACK, 0.0);
+    for &i in &g.hits {
+        let (ray, surface) = &hits[i];
+        let beside = hybrid.beside_diffuse(surface, ray, &plan, rng);
+        p.emission += beside.emission * share;
+        sum += beside.specular;
+        square += beside.specular.luminance() * beside.specular.luminance();
+        p.normal += surface.ns * share;
+        p.depth += surface.position.distance(ray.origin) * share / shot_alpha(hits.len() as f32 * share);
+    }
+    p.specular += sum * share + lit.glossy * coverage;
+    if count > 1.0 {
+        let mean = sum.luminance() / count;
+        shot.camera_variance += (square / count - mean * mean).max(0.0) / (count - 1.0) * part * part;
+    }
+    shot.light_variance += lit.variance * coverage * coverage;
+    if part > 0.49 {
+        shot.visible = lit.visible;
+    }
+    let gloss = surface.bsdf.has_specular()
+        && !surface.bsdf.is_delta()
+        && surface.bsdf.specular_albedo(wo).max_channel() > 0.01;
+    shot.fine |= textured || gloss || surface.coverage < 1.0;
+}
+
+fn shot_alpha(alpha: f32) -> f32 {
+    alpha.max(1e-6)
+}
+
+/// Whether a material's look changes within a triangle.
+fn varies(world: &World, material: MaterialId) -> bool {
+    let m = &world.scene.materials[material.0 as usize];
+    m.base_color_texture.is_some()
+        || m.metallic_roughness_texture.is_some()
+        || m.normal_texture.is_some()
+        || m.emissive_texture.is_some()
+        || !world.scene.mesh.colors.is_empty()
+}
