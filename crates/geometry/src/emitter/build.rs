@@ -1,8 +1,9 @@
 //! Reads a scene and gathers all that shines in it.
 
 use super::area::PolygonLight;
+use super::bounds::LightBounds;
 use super::merge::polygons;
-use super::tree::{LightBounds, LightTree};
+use super::tree::LightTree;
 use super::{EmitterKind, Emitters, NO_LIGHT, shone_at};
 use crate::math::Vec3;
 use crate::scene::{AlphaMode, Light, LightKind, Material};

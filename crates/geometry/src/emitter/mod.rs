@@ -1,6 +1,7 @@
 //! Lamps, emissive triangles and sky as things one samples: choose a light, sample it, and the pdf of both.
 
 mod area;
+mod bounds;
 mod build;
 mod choice;
 mod emit;
