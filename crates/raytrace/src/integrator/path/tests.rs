@@ -95,7 +95,7 @@ fn a_furnace_shines_evenly() {
 }
 
 /// Floor under a square lamp: L = ρ L_lamp F, in the layer of direct light, whose two ways of sampling meet.
-/// 5 000 paths: σ = 0.3 %.
+/// 5 000 paths: σ = 0.1 %; without shadow rays 3 %.
 #[test]
 fn a_floor_under_a_lamp_is_the_closed_form() {
     let mut scene = Scene::default();
@@ -115,7 +115,7 @@ fn a_floor_under_a_lamp_is_the_closed_form() {
     }
 }
 
-/// Sphere of one ρ around a point lamp: E = I/r² directly, E/(1 − ρ) in all. 20 000 paths: σ = 0.2 %.
+/// Sphere of one ρ around a point lamp: E = I/r² directly, E/(1 − ρ) in all. 20 000 paths: σ = 0.24 %.
 #[test]
 fn a_sphere_around_a_point_multiplies_its_light() {
     let (rho, n) = (0.6f32, 48u32);
@@ -174,18 +174,18 @@ fn two_slabs_of_glass_pass_what_all_orders_add_up_to() {
     }
 }
 
-/// A lamp behind a window: shadow rays through the pane, and paths that meet the lamp through it, each alone and both
-/// together. 20 000 paths each: σ = 0.7 % together, 1.6 % without shadow rays.
+/// A lamp behind a window: with shadow rays through the pane, and by paths that meet the lamp through it alone.
+/// 40 000 paths each: σ of direct light 0.13 % with shadow rays and 0.26 % without, of indirect light 2.1 and 2.5 %.
 #[test]
 fn a_window_is_no_matter_which_way_the_lamp_is_found() {
     let mut scene = Scene::default();
     add(&mut scene, level(0.0, 5.0, true), matt(0.7));
     add(&mut scene, level(0.5, 5.0, true), Material { base_color: Rgb::splat(0.8), ..glass(None, 1.5) });
-    add(&mut scene, level(1.0, 0.5, false), lamp(10.0));
+    add(&mut scene, level(1.0, 2.0, false), lamp(10.0));
     let world = World::new(scene);
     let eye = Ray::new(Vec3::new(0.0, 0.4, 0.0), Vec3::new(0.2, -1.0, 0.1).normalize());
     let layer = |light_sampling: bool, of: fn(&Layers) -> Rgb| {
-        estimate(20_000, |rng| of(&Path::new(&world, eye, light_sampling).trace(rng).0).g)
+        estimate(40_000, |rng| of(&Path::new(&world, eye, light_sampling).trace(rng).0).g)
     };
     for of in [|l: &Layers| l.direct, |l: &Layers| l.indirect] {
         let (both, alone) = (layer(true, of), layer(false, of));
