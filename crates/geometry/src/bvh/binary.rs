@@ -82,8 +82,8 @@ pub(super) fn build(mesh: &Mesh, items: &[Item], order: Vec<u32>) -> Binary {
     }
     let source = cluster(items);
 
-    // Down: parents before children, leaves from left to right, so that every node covers a range of the order.
-    // A stack of our own, since a tree may be as deep as it has leaves.
+    // Down: parents before children, leaves from left to right, so that every node covers a range of the
+    // order. A stack of our own, since a tree may be as deep as it has leaves.
     tree.nodes.push(Node { bounds: Bounds::empty(), first: 0, count: 0, children: None });
     let mut stack = vec![(0u32, 0u32)]; // node of obvhs's, node of ours
     let mut inner = Vec::new();
@@ -165,8 +165,8 @@ impl Binary {
 
 /// How much a box may grow, relative to its longest side, before obvhs sees it.
 ///
-/// Where every pair of neighbours has a union of the same size, PLOC joins one pair in each pass: a row of 65 537 equal
-/// triangles one apart took 33 s, and takes 0.06 s with boxes that differ by as little as this.
+/// Where every pair of neighbours has a union of the same size, PLOC joins one pair in each pass: a row of 65
+/// 537 equal triangles one apart took 33 s, and takes 0.06 s with boxes that differ by as little as this.
 const JITTER: f32 = 1.0 / 64.0;
 
 /// Three numbers in [0, 1] that look unlike those of any other `n`.
@@ -180,7 +180,8 @@ fn noise(n: u32) -> Vec3A {
     Vec3A::new(mix(n), mix(n.wrapping_add(1)), mix(n.wrapping_add(2)))
 }
 
-/// obvhs's tree over the items' boxes: PLOC, reinsertion, leaves joined, reinsertion again (its medium preset).
+/// obvhs's tree over the items' boxes: PLOC, reinsertion, leaves joined, reinsertion again (its medium
+/// preset).
 fn cluster(items: &[Item]) -> Bvh2 {
     // Into the unit cube, so that areas neither overflow nor vanish; only the shape of the tree is used.
     let scene = items.iter().fold(Bounds::empty(), |b, i| b.union(&i.bounds));

@@ -20,9 +20,10 @@ const CELL_BITS: u32 = 21;
 
 /// The valid triangles of a mesh in Morton order, cut into items.
 ///
-/// obvhs clusters neighbours whose union is smallest. Where all unions are equal, as among n copies of one triangle,
-/// it joins one pair in each pass and takes n² time: 16 000 copies took it 9 s. So triangles whose centroids fall in one
-/// cell of a grid of 2²¹ cells along the longest axis become one item, which [`super::binary`] halves itself.
+/// obvhs clusters neighbours whose union is smallest. Where all unions are equal, as among n copies of one
+/// triangle, it joins one pair in each pass and takes n² time: 16 000 copies took it 9 s. So triangles whose
+/// centroids fall in one cell of a grid of 2²¹ cells along the longest axis become one item, which
+/// [`super::binary`] halves itself.
 pub(super) fn items(mesh: &Mesh) -> (Vec<Item>, Vec<u32>) {
     let valid: Vec<u32> =
         (0..mesh.triangles.len() as u32).into_par_iter().filter(|&t| is_valid(mesh, t)).collect();

@@ -1,5 +1,11 @@
 //! Which instructions trace rays.
 
+use super::prepared::Prepared;
+#[cfg(target_arch = "x86_64")]
+use super::simd::Avx2;
+use super::wide::Tree;
+use super::{Hit, Ray, portable};
+
 /// A way to traverse the tree. All give the same hits, bit for bit; they differ in speed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kernel {
@@ -15,17 +21,52 @@ impl Kernel {
 
     /// Whether this machine can run it.
     pub fn is_available(self) -> bool {
-        match self {
-            Kernel::Portable => true,
-            #[cfg(target_arch = "x86_64")]
-            Kernel::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("bmi1"),
-            #[cfg(not(target_arch = "x86_64"))]
-            Kernel::Avx2 => false,
-        }
+        Tracer::new(self).is_some()
     }
 
     /// The fastest that this machine can run.
     pub fn best() -> Kernel {
         Kernel::ALL.into_iter().rev().find(|k| k.is_available()).unwrap_or(Kernel::Portable)
+    }
+}
+
+/// A kernel that this machine has.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Tracer {
+    /// Plain Rust.
+    Portable,
+    /// AVX2.
+    #[cfg(target_arch = "x86_64")]
+    Avx2(Avx2),
+}
+
+impl Tracer {
+    /// `None` where the machine has not this kernel.
+    pub fn new(kernel: Kernel) -> Option<Tracer> {
+        match kernel {
+            Kernel::Portable => Some(Tracer::Portable),
+            #[cfg(target_arch = "x86_64")]
+            Kernel::Avx2 => Avx2::detect().map(Tracer::Avx2),
+            #[cfg(not(target_arch = "x86_64"))]
+            Kernel::Avx2 => None,
+        }
+    }
+
+    /// The nearest hit.
+    pub fn closest_hit(self, tree: &Tree, ray: &Ray) -> Option<Hit> {
+        match self {
+            Tracer::Portable => portable::closest_hit(tree, &Prepared::new(ray)?),
+            #[cfg(target_arch = "x86_64")]
+            Tracer::Avx2(avx2) => avx2.closest_hit(tree, ray),
+        }
+    }
+
+    /// Whether there is any hit.
+    pub fn occluded(self, tree: &Tree, ray: &Ray) -> bool {
+        match self {
+            Tracer::Portable => Prepared::new(ray).is_some_and(|ray| portable::occluded(tree, &ray)),
+            #[cfg(target_arch = "x86_64")]
+            Tracer::Avx2(avx2) => avx2.occluded(tree, ray),
+        }
     }
 }

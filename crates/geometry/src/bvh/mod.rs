@@ -1,15 +1,16 @@
 //! What a ray meets first, and whether it meets anything.
 //!
-//! obvhs builds a binary tree; ours is the rest: the tree is folded into nodes of eight boxes over blocks of four
-//! triangles, and traversed by a portable kernel or a vector one, chosen once at run time. All kernels do the same
-//! IEEE operations in the same order, so they return the same bits.
+//! obvhs builds a binary tree; ours is the rest: the tree is folded into nodes of eight boxes over blocks of
+//! four triangles, and traversed by a portable kernel or a vector one, chosen once at run time. All kernels
+//! do the same IEEE operations in the same order, so they return the same bits.
 //!
-//! The triangle test is watertight (Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013):
-//! no ray passes between two triangles that share an edge or a corner.
+//! The triangle test is watertight (Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT
+//! 2(1), 2013): no ray passes between two triangles that share an edge or a corner.
 
 mod binary;
 mod items;
 mod kernel;
+mod plan;
 mod portable;
 mod prepared;
 #[cfg(target_arch = "x86_64")]
@@ -21,7 +22,7 @@ mod wide;
 use crate::Mesh;
 use crate::math::Vec3;
 pub use kernel::Kernel;
-use prepared::Prepared;
+use kernel::Tracer;
 use wide::Tree;
 
 /// A half-line, or a piece of one: `origin + t · direction` for t in (t_min, t_max).
@@ -66,7 +67,7 @@ pub struct Hit {
 #[derive(Debug)]
 pub struct Bvh {
     tree: Tree,
-    kernel: Kernel,
+    tracer: Tracer,
 }
 
 impl Bvh {
@@ -79,33 +80,22 @@ impl Bvh {
     pub fn build_for(mesh: &Mesh, kernel: Kernel) -> Bvh {
         let (items, order) = items::items(mesh);
         let tree = wide::fold(mesh, binary::build(mesh, &items, order));
-        Bvh { tree, kernel: if kernel.is_available() { kernel } else { Kernel::Portable } }
+        Bvh { tree, tracer: Tracer::new(kernel).unwrap_or(Tracer::Portable) }
     }
 
     /// The nearest triangle that the ray meets within (t_min, t_max), from either side.
     ///
-    /// Of several at exactly the same `t` the one with the smallest index. A ray that is not finite meets nothing.
+    /// Of several at exactly the same `t` the one with the smallest index. A ray that is not finite meets
+    /// nothing.
+    #[inline]
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        let ray = &Prepared::new(ray)?;
-        match self.kernel {
-            #[cfg(target_arch = "x86_64")]
-            #[allow(unsafe_code)]
-            // SAFETY: the kernel is available.
-            Kernel::Avx2 => unsafe { simd::closest_hit(&self.tree, ray) },
-            _ => portable::closest_hit(&self.tree, ray),
-        }
+        self.tracer.closest_hit(&self.tree, ray)
     }
 
     /// Whether the ray meets any triangle within (t_min, t_max).
+    #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
-        let Some(ray) = &Prepared::new(ray) else { return false };
-        match self.kernel {
-            #[cfg(target_arch = "x86_64")]
-            #[allow(unsafe_code)]
-            // SAFETY: the kernel is available.
-            Kernel::Avx2 => unsafe { simd::occluded(&self.tree, ray) },
-            _ => portable::occluded(&self.tree, ray),
-        }
+        self.tracer.occluded(&self.tree, ray)
     }
 
     /// Memory that the tree takes, bytes.

@@ -75,8 +75,8 @@ pub(super) fn occluded(tree: &Tree, ray: &Prepared) -> bool {
 
 /// Where the ray enters each child's box, or infinity where it misses it within [t_min, t_max].
 ///
-/// In an axis along which the ray does not move, (b − o) · ∞ is ±∞, or NaN for an origin right on the box's face; a NaN
-/// here must leave the interval as it is, which `f32::max` and `min` promise.
+/// In an axis along which the ray does not move, (b − o) · ∞ is ±∞, or NaN for an origin right on the box's
+/// face; a NaN here must leave the interval as it is, which `f32::max` and `min` promise.
 fn enter(node: &Node, ray: &Prepared, t_max: f32) -> [f32; WIDTH] {
     let mut near = [ray.t_min; WIDTH];
     let mut far = [t_max; WIDTH];
@@ -99,10 +99,11 @@ fn enter(node: &Node, ray: &Prepared, t_max: f32) -> [f32; WIDTH] {
 
 /// Meets the ray with four triangles; keeps the nearest, and of equals the first by index.
 ///
-/// Woop et al. 2013, section 3: the corners, relative to the origin, are sheared so that the ray becomes the z axis;
-/// U, V and W are then the areas (twice, signed) of the triangles that the axis makes with the three edges. An edge
-/// yields the same number, but for its sign, in both of its triangles, and the sign is right or the number is zero:
-/// a · b − c · d rounds its products monotonically, and no fused multiply-add may spoil that. Zero counts as inside.
+/// Woop et al. 2013, section 3: the corners, relative to the origin, are sheared so that the ray becomes the
+/// z axis; U, V and W are then the areas (twice, signed) of the triangles that the axis makes with the three
+/// edges. An edge yields the same number, but for its sign, in both of its triangles, and the sign is right
+/// or the number is zero: a · b − c · d rounds its products monotonically, and no fused multiply-add may
+/// spoil that. Zero counts as inside.
 fn block(block: &Block, ray: &Prepared, t_max: &mut f32, best: &mut Option<Hit>) {
     let [kx, ky, kz] = ray.axes;
     let [sx, sy, sz] = ray.shear;

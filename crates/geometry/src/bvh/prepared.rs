@@ -2,8 +2,8 @@
 
 use super::Ray;
 
-/// Relative widening of the slab distances: each carries three roundings of half an ulp (subtract, reciprocal,
-/// multiply), and the triangle test's shear as many again.
+/// Relative widening of the slab distances: each carries three roundings of half an ulp (subtract,
+/// reciprocal, multiply), and the triangle test's shear as many again.
 const WIDEN: f32 = 3.0 * f32::EPSILON;
 
 /// A ray, ready to be traced.
@@ -28,6 +28,7 @@ pub(super) struct Prepared {
 
 impl Prepared {
     /// `None` for a ray that is not finite or has no direction or no length: it meets nothing.
+    #[inline(always)]
     pub fn new(ray: &Ray) -> Option<Prepared> {
         let d = ray.direction;
         let z = d.abs().max_position();

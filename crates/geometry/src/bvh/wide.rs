@@ -1,6 +1,7 @@
 //! The tree that rays see: nodes of eight boxes, blocks of four triangles, both lane by lane.
 
 use super::binary::{self, Binary, LEAF};
+use super::plan::Plan;
 use crate::Mesh;
 
 /// Children of a node.
@@ -10,9 +11,9 @@ pub(super) const LANES: usize = LEAF as usize;
 /// Set in a reference to a block; the other bits count blocks, or nodes.
 pub(super) const BLOCK: u32 = 1 << 31;
 /// Levels below which obvhs's tree is followed no further but halved, so that the depth is bounded.
-const DEEP: u32 = 40;
-/// References a traversal may have to hold: at each level all children but the one it goes on with. Halving 2³²
-/// triangles down to blocks takes 30 binary levels; each level of wide nodes undoes at least one.
+const DEEP: u32 = 24;
+/// References a traversal may have to hold: at each level all children but the one it goes on with. Halving
+/// 2³² triangles down to blocks takes 30 binary levels; each level of wide nodes undoes at least one.
 pub(super) const STACK: usize = (DEEP as usize + 30) * (WIDTH - 1) + 1;
 
 /// Eight boxes: `bounds[0]` the least corners, `bounds[1]` the greatest, each by axis, then by child.
@@ -51,31 +52,40 @@ impl Tree {
     }
 }
 
-/// Folds a binary tree into a wide one: each node opens its child of largest area until it has eight.
-pub(super) fn fold(mesh: &Mesh, mut binary: Binary) -> Tree {
-    let mut tree = Tree { nodes: vec![Node::empty()], blocks: Vec::with_capacity(binary.order.len() / 2) };
+/// Folds a binary tree into a wide one, by the plan of least cost.
+pub(super) fn fold(mesh: &Mesh, binary: Binary) -> Tree {
+    fold_to(mesh, binary, DEEP)
+}
+
+/// As [`fold`], with the level `deep` below which the tree is halved.
+pub(super) fn fold_to(mesh: &Mesh, mut binary: Binary, deep: u32) -> Tree {
+    let mut tree = Tree { nodes: vec![Node::empty()], blocks: Vec::with_capacity(binary.order.len() / 3) };
     // Depth first, so that a subtree is together in memory.
     let mut stack = Vec::new();
     if !binary.nodes.is_empty() {
         stack.push((0, 0, 0));
     }
+    let mut plan = Plan::new(&binary);
+    let mut children = Vec::with_capacity(WIDTH);
     while let Some((from, to, depth)) = stack.pop() {
-        if depth == DEEP {
+        if depth == deep {
             let node = binary.nodes[from as usize];
             binary.halve(mesh, from, node.first, node.count);
+            plan.replace(&binary, from);
         }
-        let children = open(&binary, from);
+        children.clear();
+        plan.children(&binary, from, &mut children);
         for (lane, &child) in children.iter().enumerate().rev() {
             let source = binary.nodes[child as usize];
-            let reference = if source.children.is_some() {
+            let reference = if plan.is_leaf(child) {
+                let range = source.first as usize..(source.first + source.count) as usize;
+                tree.blocks.push(Block::new(mesh, &binary.order[range]));
+                BLOCK | (tree.blocks.len() as u32 - 1)
+            } else {
                 tree.nodes.push(Node::empty());
                 let at = tree.nodes.len() as u32 - 1;
                 stack.push((child, at, depth + 1));
                 at
-            } else {
-                let range = source.first as usize..(source.first + source.count) as usize;
-                tree.blocks.push(Block::new(mesh, &binary.order[range]));
-                BLOCK | (tree.blocks.len() as u32 - 1)
             };
             tree.nodes[to as usize].set(lane, &source.bounds, reference);
         }
@@ -84,24 +94,6 @@ pub(super) fn fold(mesh: &Mesh, mut binary: Binary) -> Tree {
         tree.blocks.push(Block::new(mesh, &[])); // what the lanes without a child refer to
     }
     tree
-}
-
-/// Up to eight descendants of `at` that together hold what it holds.
-fn open(binary: &Binary, at: u32) -> Vec<u32> {
-    let mut children = vec![at];
-    while children.len() < WIDTH {
-        let area = |&(_, &c): &(usize, &u32)| binary.nodes[c as usize].bounds.half_area();
-        let largest = children
-            .iter()
-            .enumerate()
-            .filter(|&(_, &c)| binary.nodes[c as usize].children.is_some())
-            .max_by(|a, b| area(a).total_cmp(&area(b)));
-        let Some((i, &child)) = largest else { break };
-        let Some([left, right]) = binary.nodes[child as usize].children else { break };
-        children[i] = left;
-        children.push(right);
-    }
-    children
 }
 
 impl Node {

@@ -3,6 +3,7 @@
 use super::shapes::{cube, moved, random_soup, sphere};
 use super::*;
 use crate::Mesh;
+use crate::bvh::prepared::Prepared;
 use glam::DVec3;
 
 /// The nearest hit by asking every block.
@@ -30,8 +31,8 @@ fn check(mesh: &Mesh, rays: usize, seed: u64) {
     let others: Vec<Bvh> = Kernel::ALL.into_iter().map(|k| Bvh::build_for(mesh, k)).collect();
     let (lo, hi) = mesh.bounds().unwrap();
     let (centre, size) = (0.5 * (lo + hi), 0.5 * (hi - lo).max_element());
-    // t is worked out from corners relative to the origin, of magnitude up to a few sizes; so is what is left of the
-    // weights near an edge, in proportion to the triangle's own size, hence the larger margin below.
+    // t is worked out from corners relative to the origin, of magnitude up to a few sizes; so is what is left
+    // of the weights near an edge, in proportion to the triangle's own size, hence the larger margin below.
     let tolerance = 1e-5 * size as f64;
     let random = &mut Random(seed);
     let mut hits = 0;
@@ -46,8 +47,8 @@ fn check(mesh: &Mesh, rays: usize, seed: u64) {
         assert_eq!(hit, brute_force(&bvh, &ray), "{ray:?}");
         assert_eq!(bvh.occluded(&ray), hit.is_some(), "{ray:?}");
         for other in &others {
-            assert_eq!(other.closest_hit(&ray), hit, "{ray:?} by {:?}", other.kernel);
-            assert_eq!(other.occluded(&ray), hit.is_some(), "{ray:?} by {:?}", other.kernel);
+            assert_eq!(other.closest_hit(&ray), hit, "{ray:?} by {:?}", other.tracer);
+            assert_eq!(other.occluded(&ray), hit.is_some(), "{ray:?} by {:?}", other.tracer);
         }
         if let Some(h) = hit {
             hits += 1;

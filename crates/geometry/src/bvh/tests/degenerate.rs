@@ -95,3 +95,33 @@ fn an_even_row_builds_fast() {
     let ray = Ray { t_min: 0.5, ..Ray::new(Vec3::new(1000.0, 0.2, 0.2), Vec3::X) };
     assert_eq!(bvh.closest_hit(&ray).map(|h| (h.triangle, h.t)), Some((1001, 1.0)));
 }
+
+#[test]
+fn a_tree_too_deep_is_halved_and_gives_the_same_hits() {
+    let mesh = random_soup(3000, 0.2, &mut Random(6));
+    let deep = Bvh::build(&mesh);
+    let (items, order) = items::items(&mesh);
+    for level in 0..4 {
+        let binary = binary::build(&mesh, &items, order.clone());
+        let halved = Bvh { tree: wide::fold_to(&mesh, binary, level), tracer: deep.tracer };
+        let random = &mut Random(7);
+        for _ in 0..3000 {
+            let ray = Ray::new(1.5 * random.cube(), random.direction());
+            assert_eq!(halved.closest_hit(&ray), deep.closest_hit(&ray));
+        }
+    }
+}
+
+#[test]
+fn triangles_in_a_geometric_series_are_met() {
+    // Each an eighth as large as the one before: what makes a tree as deep as it has triangles.
+    let triangles: Vec<[Vec3; 3]> =
+        (0..20).map(|i| [Vec3::ONE, Vec3::X, Vec3::Y].map(|p| p * 0.125f32.powi(i - 10))).collect();
+    let bvh = Bvh::build(&soup(&triangles));
+    for (i, [a, b, c]) in triangles.iter().enumerate() {
+        let inside = (*a + *b + *c) / 3.0;
+        let n = (*b - *a).normalize().cross((*c - *a).normalize()).normalize();
+        let ray = Ray::new(inside + 0.01 * a.length() * n, -n);
+        assert_eq!(bvh.closest_hit(&ray).map(|h| h.triangle), Some(i as u32));
+    }
+}

@@ -1,11 +1,12 @@
-//! `math::offset_origin` is enough: a ray that leaves a surface does not meet it again, and does meet what touches it.
+//! `math::offset_origin` is enough: a ray that leaves a surface does not meet it again, and does meet what
+//! touches it.
 
 use super::shapes::{both, moved, soup, sphere};
 use super::*;
 use crate::math::offset_origin;
 
-/// Rays that start on a mesh, move off, and meet a triangle at less than `reach` though the side they leave to is
-/// empty (outside of convex meshes).
+/// Rays that start on a mesh, move off, and meet a triangle at less than `reach` though the side they leave
+/// to is empty (outside of convex meshes).
 fn self_hits(mesh: &Mesh, rays: usize) -> usize {
     let bvh = Bvh::build(mesh);
     let random = &mut Random(77);
