@@ -1,5 +1,6 @@
 //! Our chores, as `cargo xtask NAME`.
 
+mod bench_rays;
 mod check;
 #[cfg(test)]
 mod ourselves;
@@ -19,6 +20,9 @@ struct Args {
 
 #[derive(Subcommand)]
 enum Chore {
+    /// Measure speed
+    #[command(subcommand)]
+    Bench(Bench),
     /// Run everything that must pass before a change lands
     Check {
         /// Leave out a step
@@ -33,8 +37,15 @@ enum Chore {
     },
 }
 
+#[derive(Subcommand)]
+enum Bench {
+    /// Rays per second, beside Embree's where it is installed
+    Rays(bench_rays::Args),
+}
+
 fn main() -> Result<()> {
     match Args::parse().chore {
+        Chore::Bench(Bench::Rays(args)) => bench_rays::run(args),
         Chore::Check { without } => check::run(&without),
         Chore::Scenes { check: false } => scenes::write(&root().join("assets")),
         Chore::Scenes { check: true } => scenes::check(&root().join("assets")),

@@ -4,7 +4,7 @@
 //!
 //! 1. *The instructions exist.* An [`Avx2`] is made only where the processor was asked and has them.
 //! 2. *References are in range.* Those of a [`Tree`] are written by `wide::fold` alone and never change: each
-//! is the index of a node in the tree, or `BLOCK` plus the index of a block in it.
+//!    is the index of a node in the tree, or `BLOCK` plus the index of a block in it.
 //! 3. *The stack suffices.* `wide::fold` bounds the depth of the tree, and [`STACK`] is made from that bound.
 //! 4. *Only what was pushed is popped*, so no entry is read before it is written.
 //! 5. *Rows are aligned*: nodes to 64 bytes with rows of 32, blocks to 16 with rows of 16.
