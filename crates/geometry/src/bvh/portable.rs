@@ -105,14 +105,12 @@ fn enter(node: &Node, ray: &Prepared, t_max: f32) -> [f32; WIDTH] {
 /// or the number is zero: a · b − c · d rounds its products monotonically, and no fused multiply-add may
 /// spoil that. Zero counts as inside.
 fn block(block: &Block, ray: &Prepared, t_max: &mut f32, best: &mut Option<Hit>) {
-    let [kx, ky, kz] = ray.axes;
-    let [sx, sy, sz] = ray.shear;
+    let [sx, sy] = ray.shear;
     for lane in 0..LANES {
-        let [a, b, c] = block.corners.each_ref().map(|corner| {
-            let z = corner[kz][lane] - ray.origin[kz];
-            let x = corner[kx][lane] - ray.origin[kx] - sx * z;
-            let y = corner[ky][lane] - ray.origin[ky] - sy * z;
-            [x, y, z]
+        let corners = block.corners.each_ref().map(|rows| ray.axes.map(|k| rows[k][lane]));
+        let [a, b, c] = corners.map(|p| {
+            let z = p[2] - ray.origin[ray.axes[2]];
+            [p[0] - ray.origin[ray.axes[0]] - sx * z, p[1] - ray.origin[ray.axes[1]] - sy * z]
         });
         let u = c[0] * b[1] - c[1] * b[0];
         let v = a[0] * c[1] - a[1] * c[0];
@@ -124,13 +122,28 @@ fn block(block: &Block, ray: &Prepared, t_max: &mut f32, best: &mut Option<Hit>)
         if det == 0.0 {
             continue;
         }
-        let inverse = 1.0 / det;
-        let t = (u * a[2] + v * b[2] + w * c[2]) * sz * inverse;
+        let t = plane(corners, ray);
         let triangle = block.triangle[lane];
         let nearer = t < *t_max || (t == *t_max && best.is_some_and(|b| triangle < b.triangle));
         if t > ray.t_min && nearer {
+            let inverse = 1.0 / det;
             *t_max = t;
             *best = Some(Hit { t, triangle, u: v * inverse, v: w * inverse });
         }
     }
+}
+
+/// Where the ray meets the plane of a triangle: t = n · (a − o) / n · d, all in the order of the ray's axes.
+///
+/// Not the mean of the corners' z weighted by U, V and W, as in Woop et al.: that errs by an ulp of the
+/// farthest corner, 10 µm on a floor of 100 m, and rays from just above it fell through. Here a plane along
+/// two axes is met exactly.
+fn plane([a, b, c]: [[f32; 3]; 3], ray: &Prepared) -> f32 {
+    let [x, y, z] = [0, 1, 2];
+    let e = [b[x] - a[x], b[y] - a[y], b[z] - a[z]];
+    let f = [c[x] - a[x], c[y] - a[y], c[z] - a[z]];
+    let n = [e[y] * f[z] - e[z] * f[y], e[z] * f[x] - e[x] * f[z], e[x] * f[y] - e[y] * f[x]];
+    let to = [0, 1, 2].map(|i| a[i] - ray.origin[ray.axes[i]]);
+    let dot = |p: [f32; 3]| n[x] * p[x] + n[y] * p[y] + n[z] * p[z];
+    dot(to) / dot(ray.direction)
 }

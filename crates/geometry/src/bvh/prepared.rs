@@ -16,10 +16,13 @@ pub(super) struct Prepared {
     pub inverse_far: [f32; 3],
     /// By axis: which of a node's two rows of bounds the ray enters through; it leaves through the other.
     pub enters: [usize; 3],
-    /// Axes, the last the one along which the ray runs fastest; `Woop` permutes the corners by them.
+    /// Axes, the last the one along which the ray runs fastest; the triangle test permutes the corners by
+    /// them.
     pub axes: [usize; 3],
-    /// Shear and scale that carry the direction to (0, 0, 1), in the order of `axes`.
-    pub shear: [f32; 3],
+    /// The direction, in the order of `axes`.
+    pub direction: [f32; 3],
+    /// Shear that carries the direction to the last axis, in the order of `axes`.
+    pub shear: [f32; 2],
     /// Open interval of t.
     pub t_min: f32,
     /// Its other end.
@@ -46,7 +49,8 @@ impl Prepared {
             // The sign of the reciprocal, so that −0.0 goes with its infinity.
             enters: inverse.map(|i| usize::from(i.is_sign_negative())),
             axes,
-            shear: [d[axes[0]] * scale, d[axes[1]] * scale, scale],
+            direction: axes.map(|k| d[k]),
+            shear: [d[axes[0]] * scale, d[axes[1]] * scale],
             // Never −0.0: the vector kernels sort t by its bits.
             t_min: ray.t_min + 0.0,
             t_max: ray.t_max,

@@ -31,7 +31,8 @@ struct Lanes {
     t_min: __m256,
     /// Of the triangle test, in the order of the ray's axes.
     corner_origin: [__m128; 3],
-    shear: [__m128; 3],
+    direction: [__m128; 3],
+    shear: [__m128; 2],
 }
 
 /// References still to be looked at, and where the ray enters them: `t` in the upper half, whose bits sort as
@@ -226,7 +227,8 @@ impl Lanes {
             exit: [0, 1, 2].map(|axis| row(1 - ray.enters[axis], axis)),
             t_min: _mm256_set1_ps(ray.t_min),
             corner_origin: four(ray.axes.map(|k| ray.origin[k])),
-            shear: four(ray.shear),
+            direction: four(ray.direction),
+            shear: [_mm_set1_ps(ray.shear[0]), _mm_set1_ps(ray.shear[1])],
         }
     }
 
@@ -253,17 +255,18 @@ impl Lanes {
     #[target_feature(enable = "avx2")]
     #[inline]
     fn meet(&self, block: &Block, ray: &Prepared, best: &mut Hit, found: &mut bool) -> bool {
-        let corner = |corner: usize| {
-            let rows = &block.corners[corner];
-            // SAFETY: 5; the index of a row is an axis.
-            let row = |i: usize| unsafe { _mm_load_ps(rows.get_unchecked(ray.axes[i]).as_ptr()) };
-            let z = _mm_sub_ps(row(2), self.corner_origin[2]);
-            let across = |i: usize| {
-                _mm_sub_ps(_mm_sub_ps(row(i), self.corner_origin[i]), _mm_mul_ps(self.shear[i], z))
-            };
-            (across(0), across(1), z)
+        // SAFETY: 5; the index of a row is an axis.
+        let row = |corner: usize, i: usize| unsafe {
+            _mm_load_ps(block.corners[corner].get_unchecked(ray.axes[i]).as_ptr())
         };
-        let ((ax, ay, az), (bx, by, bz), (cx, cy, cz)) = (corner(0), corner(1), corner(2));
+        let corner = |corner: usize| {
+            let z = _mm_sub_ps(row(corner, 2), self.corner_origin[2]);
+            let across = |i: usize| {
+                _mm_sub_ps(_mm_sub_ps(row(corner, i), self.corner_origin[i]), _mm_mul_ps(self.shear[i], z))
+            };
+            (across(0), across(1))
+        };
+        let ((ax, ay), (bx, by), (cx, cy)) = (corner(0), corner(1), corner(2));
         let area = |px, py, qx, qy| _mm_sub_ps(_mm_mul_ps(px, qy), _mm_mul_ps(py, qx));
         let (u, v, w) = (area(cx, cy, bx, by), area(ax, ay, cx, cy), area(bx, by, ax, ay));
 
@@ -275,16 +278,27 @@ impl Lanes {
             return false;
         }
         let det = _mm_add_ps(_mm_add_ps(u, v), w);
-        let inverse = _mm_div_ps(_mm_set1_ps(1.0), det);
-        let sum = _mm_add_ps(_mm_add_ps(_mm_mul_ps(u, az), _mm_mul_ps(v, bz)), _mm_mul_ps(w, cz));
-        let t = _mm_mul_ps(_mm_mul_ps(sum, self.shear[2]), inverse);
+        // As `portable::plane`.
+        let edge = |to: usize| {
+            let along = |i: usize| _mm_sub_ps(row(to, i), row(0, i));
+            [along(0), along(1), along(2)]
+        };
+        let (e, f) = (edge(1), edge(2));
+        let n = [area(e[1], e[2], f[1], f[2]), area(e[2], e[0], f[2], f[0]), area(e[0], e[1], f[0], f[1])];
+        let dot = |p: [__m128; 3]| {
+            let xy = _mm_add_ps(_mm_mul_ps(n[0], p[0]), _mm_mul_ps(n[1], p[1]));
+            _mm_add_ps(xy, _mm_mul_ps(n[2], p[2]))
+        };
+        let to = |i: usize| _mm_sub_ps(row(0, i), self.corner_origin[i]);
+        let t = _mm_div_ps(dot([to(0), to(1), to(2)]), dot(self.direction));
         let within =
             _mm_and_ps(_mm_cmpgt_ps(t, _mm_set1_ps(ray.t_min)), _mm_cmple_ps(t, _mm_set1_ps(best.t)));
-        let area = _mm_cmpneq_ps(det, zero);
-        let mut mask = _mm_movemask_ps(_mm_and_ps(_mm_and_ps(inside, within), area)) as u32;
+        let real = _mm_cmpneq_ps(det, zero);
+        let mut mask = _mm_movemask_ps(_mm_and_ps(_mm_and_ps(inside, within), real)) as u32;
         if mask == 0 {
             return false;
         }
+        let inverse = _mm_div_ps(_mm_set1_ps(1.0), det);
         let (t, u, v) = (four(t), four(_mm_mul_ps(v, inverse)), four(_mm_mul_ps(w, inverse)));
         let mut changed = false;
         while mask != 0 {

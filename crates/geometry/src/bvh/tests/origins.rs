@@ -87,3 +87,24 @@ fn a_sphere_on_a_plane_far_away_has_no_acne_and_no_gap() {
         assert!(hit.is_none_or(|h| h.triangle >= first), "{ray:?} {hit:?}");
     }
 }
+
+#[test]
+fn a_wide_level_floor_is_met_from_just_above() {
+    // Whatever the floor's size, its height is exact, and so is where a ray meets it.
+    for half in [1.0, 110.81132, 1e4] {
+        let [a, b, c, d] =
+            [[-half, -half], [half, -half], [half, half], [-half, half]].map(|[x, z]| Vec3::new(x, 0.0, z));
+        let bvh = Bvh::build(&soup(&[[a, c, b], [a, d, c]]));
+        let random = &mut Random(9);
+        for _ in 0..5000 {
+            let height = 1e-7 * (1.0 + 100.0 * random.unit());
+            let origin = Vec3::new(0.5 * half * random.unit(), height, -0.3 * half * random.unit());
+            let d = random.cube().normalize();
+            let direction = Vec3::new(d.x, -d.y.abs().max(1e-3), d.z).normalize();
+            let t = height / -direction.y;
+            let hit = bvh.closest_hit(&Ray::new(origin, direction));
+            assert!(hit.is_some_and(|h| (h.t - t).abs() < 1e-6 * t), "{t} {hit:?}");
+            assert!(!bvh.occluded(&Ray::new(origin, -direction)));
+        }
+    }
+}
