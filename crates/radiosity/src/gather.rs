@@ -28,6 +28,8 @@ pub struct Followed {
     pub distance: f32,
     /// The first surface met: triangle and side.
     pub first: Option<(u32, Side)>,
+    /// What arrived at diffuse surfaces, of 1 that set out: more than 1 where a coat sends light on to a second one.
+    pub arrived: f32,
 }
 
 /// Follows `ray` to the diffuse surface at its end and calls `land` there with the hit, its side, and the share of
@@ -58,6 +60,9 @@ pub fn follow(world: &World, mut ray: Ray, rng: &mut Rng, mut land: impl FnMut(&
         let (diffuse, gloss) = (albedo.luminance(), surface.bsdf.specular_albedo(wo).luminance());
         if diffuse + gloss <= 0.0 {
             return out;
+        }
+        if surface.bsdf.has_diffuse() {
+            out.arrived += throughput.mean();
         }
         let p_diffuse = diffuse / (diffuse + gloss);
         let chosen = rng.f32() < p_diffuse;
@@ -152,7 +157,7 @@ pub fn row(
     let share = 1.0 / rays as f32;
     let mut landings = Vec::with_capacity(rays as usize);
     let mut direct = Rgb::BLACK;
-    let (mut met_dead, mut kept) = (0u32, 0u32);
+    let (mut met_dead, mut kept) = (0u32, 0f32);
     for i in 0..rays {
         let origin = &origins[i as usize % origins.len()];
         let wi = to_world(cosine_hemisphere(pattern.point(i, shift)), ns);
@@ -162,19 +167,19 @@ pub fn row(
         }
         let ray = Ray::new(offset_origin(origin.position, origin.ng), wi);
         let followed = follow(world, ray, &mut rng, |hit, side, weight| {
-            kept += 1;
             if !dead(hit.triangle, side) {
                 landings.push(Landing::new(hit.triangle, side, hit.u, hit.v, weight * share));
             }
         });
         direct += followed.direct * share;
+        kept += followed.arrived * share;
         met_dead += u32::from(followed.first.is_some_and(|(t, side)| dead(t, side)));
     }
     Row {
         direct,
         landings: landings.into_boxed_slice(),
         dead: met_dead as f32 * share,
-        kept: kept as f32 * share,
+        kept,
     }
 }
 

@@ -37,6 +37,8 @@ pub(crate) struct Refiner<'a> {
     pub(crate) field: Field,
     /// E at the sites, lx.
     pub(crate) e: Vec<Rgb>,
+    /// For each piece, whether any of it reflects diffusely: mirrors and glass need no irradiance.
+    diffuse: Vec<bool>,
     /// Vertices whose surroundings the mesh does not resolve.
     pub(crate) unresolved: Vec<VertexId>,
     /// Longest edge of the first mesh, m.
@@ -67,7 +69,14 @@ impl<'a> Refiner<'a> {
         let most = config.most_vertices.max(2 * elements.vertices.len());
         elements.split_longer_than(h0, most);
         let reach = Reach::explore(world, &elements, config.seed);
+        let mut diffuse = vec![false; elements.pieces as usize];
+        for (t, material) in world.scene.mesh.materials.iter().enumerate() {
+            if let Some(piece) = elements.piece(t as u32) {
+                diffuse[piece as usize] |= world.scene.materials[material.0 as usize].may_be_diffuse();
+            }
+        }
         let mut refiner = Refiner {
+            diffuse,
             world,
             config,
             progress,
@@ -193,10 +202,10 @@ impl<'a> Refiner<'a> {
         })
     }
 
-    /// Which vertices a leaf uses.
+    /// Which vertices a leaf that reflects diffusely uses.
     fn used(&self) -> Vec<bool> {
         let mut used = vec![false; self.elements.vertices.len()];
-        for leaf in self.elements.leaves() {
+        for leaf in self.elements.leaves().filter(|&leaf| self.diffuse[self.elements.piece_of(leaf)]) {
             for v in self.elements.nodes[leaf as usize].vertices {
                 used[v as usize] = true;
             }
@@ -211,7 +220,8 @@ impl<'a> Refiner<'a> {
             let node = &self.elements.nodes[leaf as usize];
             let corners = self.elements.corners(leaf);
             let piece = self.elements.vertices[node.vertices[0] as usize].piece;
-            if !Side::BOTH.iter().any(|&side| self.reach.alive(piece, side)) {
+            let lit = Side::BOTH.iter().any(|&side| self.reach.alive(piece, side));
+            if !lit || !self.diffuse[piece as usize] {
                 continue;
             }
             for e in 0..3 {

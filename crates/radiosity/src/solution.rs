@@ -84,7 +84,8 @@ impl Report {
     }
 }
 
-/// Σ A E over Σ A ρ (E + D + C) (1 − escaped): what arrives indirectly, over what leaves and stays in the scene.
+/// Σ A E over Σ A ρ (E + D + C) kept, over surfaces that reflect diffusely: what arrives at them indirectly, over what
+/// leaves them for one another.
 fn balance(world: &World, refiner: &Refiner, extra: &[Rgb], direct: &[Rgb]) -> f32 {
     let (elements, field) = (&refiner.elements, &refiner.field);
     let e = field.spread(&refiner.e);
@@ -103,6 +104,9 @@ fn balance(world: &World, refiner: &Refiner, extra: &[Rgb], direct: &[Rgb]) -> f
             let n = n * side.sign();
             let ray = Ray::new((a + b + c) / 3.0 + n, -n);
             let surface = Surface::new(&world.scene, &ray, &Hit { t: 1.0, triangle: t, u, v });
+            if !surface.bsdf.has_diffuse() {
+                continue;
+            }
             let rho = surface.bsdf.diffuse_reflectance();
             for v in elements.nodes[leaf as usize].vertices {
                 let s = slot(v, side);

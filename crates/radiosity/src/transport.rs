@@ -59,7 +59,7 @@ pub struct Row {
     pub landings: Box<[Landing]>,
     /// Share of the rays that first met a side that light cannot reach.
     pub dead: f32,
-    /// Share of the rays that landed; by reciprocity the share of the light that leaves here and stays in the scene.
+    /// What arrived at diffuse surfaces of 1 that set out; by reciprocity, what the light that leaves here brings there.
     pub kept: f32,
 }
 
@@ -70,6 +70,23 @@ struct Located {
     side: Side,
     bary: [u16; 2],
     weight: [f16; 3],
+}
+
+/// Largest row sum that is let stand.
+///
+/// No surface reflects more than it receives, so no true row sums to more than the largest reflectance; an estimate
+/// from few rays may, and a file may claim a reflectance of 1 all around. Above this bound the iteration would not
+/// contract: the row is scaled down to it, a loss of light of at most the excess.
+pub const LARGEST_ROW_SUM: f32 = 0.998;
+
+fn keep_contracting(row: &mut [Located]) {
+    let sum: Rgb = row.iter().map(|l| Rgb::from(l.weight.map(f32::from))).sum();
+    let excess = sum.map(|s| (LARGEST_ROW_SUM / s.max(1e-30)).min(1.0));
+    if excess != Rgb::WHITE {
+        for landing in row {
+            landing.weight = (Rgb::from(landing.weight.map(f32::from)) * excess).to_array().map(f16::from_f32);
+        }
+    }
 }
 
 /// The rows of all sites over the present element mesh.
@@ -99,7 +116,9 @@ impl<'a> Transport<'a> {
                     let fix = |x: f32| (x * 65535.0 + 0.5) as u16;
                     Some(Located { node, side, bary: [fix(w[0]), fix(w[1])], weight: landing.weight })
                 };
-                site.row.landings.iter().filter_map(locate).collect()
+                let mut row: Vec<Located> = site.row.landings.iter().filter_map(locate).collect();
+                keep_contracting(&mut row);
+                row
             })
             .collect();
         Transport { elements, field, rows }

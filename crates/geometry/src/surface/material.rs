@@ -5,6 +5,14 @@ use crate::optics::f0_from_ior;
 use crate::{AlphaMode, Material, Volume};
 
 impl Material {
+    /// Whether any point of it may reflect diffusely.
+    pub fn may_be_diffuse(&self) -> bool {
+        let metal = self.metallic >= 1.0 && self.metallic_roughness_texture.is_none();
+        let glass = self.transmission >= 1.0 && self.transmission_texture.is_none();
+        let black = self.base_color.is_black() && self.specular == 0.0;
+        !(metal || glass || self.unlit || black)
+    }
+
     /// Whether some light may go straight on through it, so that a shadow ray must ask how much.
     pub fn may_pass_straight(&self) -> bool {
         self.alpha_mode != AlphaMode::Opaque || (self.may_transmit() && self.may_be_straight())

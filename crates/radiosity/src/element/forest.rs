@@ -161,6 +161,11 @@ impl Elements {
         (v != VertexId::MAX).then(|| self.vertices[v as usize].piece)
     }
 
+    /// The piece of surface that a leaf belongs to.
+    pub fn piece_of(&self, leaf: u32) -> usize {
+        self.vertices[self.nodes[leaf as usize].vertices[0] as usize].piece as usize
+    }
+
     /// The leaf that holds the point (u, v) of scene triangle `t`, with the weights of the leaf's three corners.
     pub fn locate(&self, t: u32, u: f32, v: f32) -> (u32, [f32; 3]) {
         let mut at = t;
