@@ -17,6 +17,10 @@ use rayon::prelude::*;
 const NEAREST: usize = 80;
 /// Particles in one batch; the batch number seeds it, whatever thread runs it.
 const BATCH: usize = 4096;
+/// Batches of the pilot.
+const PILOT: usize = 16;
+/// Caustics that carry this share of all light get all the particles asked for; those that carry less, fewer.
+const MATTERS: f32 = 0.05;
 /// Surfaces a particle meets at most.
 const LONGEST: usize = 32;
 /// Photons kept at most (56 bytes each).
@@ -49,29 +53,39 @@ pub struct Caustics {
 }
 
 impl Caustics {
-    /// Sends `particles` from the emitters; none when nothing in the scene reflects or refracts sharply.
+    /// Sends `particles` from the emitters, fewer when little light comes this way; none when nothing in the scene reflects or refracts sharply.
     pub fn trace(world: &World, elements: &Elements, particles: usize, seed: u64) -> Caustics {
         let targets = targets(world, elements);
         if targets.is_empty() || world.emitters.is_empty() {
             return Caustics::default();
         }
-        let batches = particles.div_ceil(BATCH);
-        let share = 1.0 / (batches * BATCH) as f32;
-        let mut photons: Vec<Photon> = (0..batches)
-            .into_par_iter()
-            .flat_map_iter(|batch| {
+        let batches = |which: std::ops::Range<usize>| -> Vec<Photon> {
+            let send_batch = |batch: usize| {
                 let mut landed = Vec::new();
                 for i in 0..BATCH {
                     let mut rng = Rng::new(seed ^ 0x7068_6f74_6f6e, (batch * BATCH + i) as u64);
-                    send(world, &targets, share, &mut rng, &mut landed);
+                    send(world, &targets, &mut rng, &mut landed);
                 }
                 landed
-            })
-            .collect();
+            };
+            which.into_par_iter().flat_map_iter(send_batch).collect()
+        };
+        // A pilot tells what share of all light comes this way; a small share may be blurred more for the same error.
+        let pilot = PILOT.min(particles.div_ceil(BATCH));
+        let mut photons = batches(0..pilot);
+        let flux = photons.iter().map(|p| p.flux.luminance()).sum::<f32>() / (pilot * BATCH) as f32;
+        let power: f32 = world.emitters.power().iter().map(|p| p.luminance()).sum();
+        let wanted = particles as f32 * (flux / (MATTERS * power).max(1e-30)).min(1.0);
+        let last = (wanted as usize / BATCH).max(pilot);
+        photons.extend(batches(pilot..last));
+        let share = 1.0 / (last * BATCH) as f32;
+        for photon in &mut photons {
+            photon.flux *= share;
+        }
         photons.truncate(MOST); // bounded by memory; with 32 landings a particle it takes 62 500 particles at least
         let mut axes = vec![0; photons.len()];
         balance(&mut photons, &mut axes);
-        Caustics { photons, axes, reach: 0.03 * world.diagonal, sent: batches * BATCH }
+        Caustics { photons, axes, reach: 0.03 * world.diagonal, sent: last * BATCH }
     }
 
     /// Number of photons kept.
@@ -179,10 +193,10 @@ fn targets(world: &World, elements: &Elements) -> Vec<(Vec3, f32)> {
 }
 
 /// One particle's way.
-fn send(world: &World, targets: &[(Vec3, f32)], share: f32, rng: &mut Rng, landed: &mut Vec<Photon>) {
+fn send(world: &World, targets: &[(Vec3, f32)], rng: &mut Rng, landed: &mut Vec<Photon>) {
     let u = rng.array();
     let Some(start) = world.emitters.emit_toward(&world.scene, targets, u) else { return };
-    let mut flux = start.flux * share;
+    let mut flux = start.flux;
     let mut ray = start.ray;
     let mut specular = 0;
     let mut rough_first = false;

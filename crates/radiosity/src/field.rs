@@ -63,6 +63,14 @@ impl Field {
         self.sources.par_iter().map(value).collect()
     }
 
+    /// Largest difference (mean of the channels) among the sites that a slot is interpolated from; 0 for one of its own.
+    pub fn spread_around(&self, slot: usize, e: &[Rgb]) -> f32 {
+        let Source::Near(sites, weights) = &self.sources[slot] else { return 0.0 };
+        let around =
+            || sites.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(&i, _)| e[i as usize].mean());
+        around().fold(0.0, f32::max) - around().fold(f32::INFINITY, f32::min).min(f32::MAX)
+    }
+
     /// Finds for every slot where its value comes from, after sites were added or the mesh was refined.
     ///
     /// `radius` is the reach of a site ([`crate::element::cluster`]).

@@ -37,6 +37,11 @@ impl Flags {
         self.bits.get(2 * node as usize + side.index()).copied().unwrap_or(0)
     }
 
+    /// Whether nothing was asked yet.
+    pub fn is_empty(&self) -> bool {
+        self.bits.is_empty()
+    }
+
     /// Whether anything is wrong.
     pub fn any(&self, node: u32, side: Side) -> bool {
         self.get(node, side) != 0

@@ -175,12 +175,7 @@ pub fn row(
         kept += followed.arrived * share;
         met_dead += u32::from(followed.first.is_some_and(|(t, side)| dead(t, side)));
     }
-    Row {
-        direct,
-        landings: landings.into_boxed_slice(),
-        dead: met_dead as f32 * share,
-        kept,
-    }
+    Row { direct, landings: landings.into_boxed_slice(), dead: met_dead as f32 * share, kept }
 }
 
 /// Irradiance (lx) straight from the emitters around the unit normal `ns`, by `samples` light samples shared evenly

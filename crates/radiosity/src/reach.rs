@@ -47,7 +47,7 @@ impl Reach {
                     wander(
                         world,
                         elements,
-                        &mut Rng::new(seed ^ 0x7265_6163_68, (batch * 1024 + i) as u64),
+                        &mut Rng::new(seed ^ 0x72_6561_6368, (batch * 1024 + i) as u64),
                         &mut met,
                     );
                 }

@@ -99,54 +99,117 @@ impl<'a> Refiner<'a> {
         refiner
     }
 
-    /// Tests and refines until the tolerance, the finest edge, the rounds or the time are reached.
+    /// Tests and refines until the tolerance, the finest edge, the sites, the rounds or the time run out.
     pub(crate) fn refine(&mut self) {
         self.settle();
         let mut edges = self.edges_longer_than(self.radius.max(2.0 * self.h_min), |_| true);
         let mut clusters = Clusters::new(self);
-        let mut parents: Vec<usize> = (0..clusters.members.len()).collect();
+        let mut open: Vec<usize> = (0..clusters.members.len()).collect();
+        // Vertices far from their prediction around which nothing finer was tested.
+        let mut rough = vec![false; self.elements.vertices.len()];
         for round in 0..self.config.rounds {
-            if self.progress.stopped() || (edges.is_empty() && parents.is_empty()) {
+            if self.progress.stopped() {
                 break;
             }
-            let mut tests = self.split(&edges);
-            let (members, owners) = clusters.furthest(self, &parents);
-            tests.extend(members);
-            if tests.is_empty() {
+            let left = self.config.most_sites.saturating_sub(self.field.sites.len());
+            // The first rounds may not use up what later ones need to go deep.
+            let room = if round + 1 < self.config.rounds { left / 2 } else { left };
+            let (chosen, kept, members) = self.choose(&edges, clusters.furthest(self, &open), room);
+            if chosen.is_empty() && members.is_empty() {
                 break;
             }
-            let vertices: Vec<VertexId> = tests.iter().map(|t| t.vertex).collect();
-            self.gather(&vertices);
+            for &(a, b) in &chosen {
+                (rough[a as usize], rough[b as usize]) = (false, false);
+            }
+            let mut tests = self.split(&chosen);
+            tests.extend(members.iter().map(|&(c, vertex, length)| Test {
+                vertex,
+                from: vec![(clusters.members[c].0, 1.0)],
+                length,
+                parted: false,
+            }));
+            self.gather(&tests.iter().map(|t| t.vertex).collect::<Vec<_>>());
             self.settle();
             let values = self.field.spread(&self.e);
             let floor = 0.1 * mean(&self.e).mean();
             let errors: Vec<f32> = tests.iter().map(|t| self.error(t, &values, floor)).collect();
-            let failed: Vec<bool> = tests
-                .iter()
-                .zip(&errors)
-                .map(|(t, e)| {
-                    e * t.length / self.h0 > self.config.tolerance
-                        || (t.parted && t.length > 4.0 * self.h_min)
-                })
-                .collect();
-            let mut again = vec![false; self.elements.vertices.len()];
-            for (test, _) in tests.iter().zip(&failed).filter(|(_, f)| **f) {
-                again[test.vertex as usize] = true;
+            rough.resize(self.elements.vertices.len(), false);
+            let mut failed = vec![false; self.elements.vertices.len()];
+            for (test, &error) in tests.iter().zip(&errors) {
+                let weighed = error * test.length / self.h0;
+                // What stands on an edge is worth a quarter of the tolerance: the light may be even all the same.
+                failed[test.vertex as usize] =
+                    weighed > self.config.tolerance * if test.parted { 0.25 } else { 1.0 };
+                rough[test.vertex as usize] = error > ROUGH;
             }
-            edges = self.edges_longer_than(2.0 * self.h_min, |v| again[v as usize]);
-            let mut open = vec![false; self.elements.vertices.len()];
-            if round + 1 < self.config.rounds {
-                for &(a, b) in &edges {
-                    (open[a as usize], open[b as usize]) = (true, true);
-                }
-            }
-            for (test, error) in tests.iter().zip(&errors) {
-                if *error > ROUGH && again[test.vertex as usize] && !open[test.vertex as usize] {
-                    self.unresolved.push(test.vertex);
-                }
-            }
-            parents = clusters.divide(self, &owners, &again);
+            edges = self.edges_longer_than(2.0 * self.h_min, |v| failed[v as usize]);
+            edges.extend(kept);
+            edges.sort_unstable();
+            edges.dedup();
+            open = clusters.divide(self, &members, &failed);
         }
+        self.unresolved = (0..rough.len() as VertexId).filter(|&v| rough[v as usize]).collect();
+    }
+
+    /// Of the edges and the clusters' furthest members, at most `room` that promise most: those along which E changes,
+    /// the longer the more. Also the promising edges for which there is no room.
+    #[allow(clippy::type_complexity)]
+    fn choose(
+        &self,
+        edges: &[(VertexId, VertexId)],
+        members: Vec<Member>,
+        room: usize,
+    ) -> (Vec<(VertexId, VertexId)>, Vec<(VertexId, VertexId)>, Vec<Member>) {
+        // Two ends that agree may still hide a bend between them: as much as this difference.
+        const HIDDEN: f32 = 0.1;
+        let values = self.field.spread(&self.e);
+        let floor = 0.1 * mean(&self.e).mean();
+        let change = |a: VertexId, b: VertexId| {
+            let of = |side: Side| {
+                let (sa, sb) = (slot(a, side), slot(b, side));
+                match (self.field.usable(sa), self.field.usable(sb)) {
+                    (true, true) => {
+                        let (va, vb) = (values[sa], values[sb]);
+                        (va - vb).map(f32::abs).mean() / (0.5 * (va + vb).mean() + floor).max(1e-30)
+                    }
+                    (false, false) => 0.0,
+                    _ => 1.0,
+                }
+            };
+            of(Side::Front).max(of(Side::Back))
+        };
+        let position = |v: VertexId| self.elements.vertices[v as usize].position;
+        let score = |change: f32, length: f32| (change + HIDDEN) * length / self.h0;
+        let mut all: Vec<(f32, usize)> = edges
+            .par_iter()
+            .map(|&(a, b)| score(change(a, b), position(a).distance(position(b))))
+            .chain(
+                members.par_iter().map(|&(_, v, length)| score(self.owner_change(v, &values, floor), length)),
+            )
+            .enumerate()
+            .map(|(i, s)| (s, i))
+            .filter(|&(s, _)| s > self.config.tolerance)
+            .collect();
+        all.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let kept = all.split_off(room.min(all.len()));
+        let edge = |&(_, i): &(f32, usize)| edges.get(i).copied();
+        let member = |&(_, i): &(f32, usize)| i.checked_sub(edges.len()).map(|m| members[m]);
+        (
+            all.iter().filter_map(edge).collect(),
+            kept.iter().filter_map(edge).collect(),
+            all.iter().filter_map(member).collect(),
+        )
+    }
+
+    /// How much the sites around `v` differ among themselves, relatively: what its own gather may bring.
+    fn owner_change(&self, v: VertexId, values: &[Rgb], floor: f32) -> f32 {
+        Side::BOTH
+            .iter()
+            .map(|&side| {
+                let s = slot(v, side);
+                self.field.spread_around(s, &self.e) / (values[s].mean() + floor).max(1e-30)
+            })
+            .fold(0.0, f32::max)
     }
 
     /// Relative difference of what was gathered from what was predicted, the worse side.
@@ -311,8 +374,14 @@ impl<'a> Refiner<'a> {
             visible_weights(self.world, &self.elements, flags, usable, node, side, w)
         });
         let norm = transport.norm();
+        // While the mesh is being refined a rough bound will do.
+        let gain = if flags.is_empty() {
+            1.0 / (1.0 - norm.min(0.9))
+        } else {
+            solver::gain(self.e.len(), |e| transport.reflect(e, &[]))
+        };
         let (e, convergence) =
-            solver::solve(self.e.clone(), norm, tolerance, most, |e| transport.apply(e, extra));
+            solver::solve(self.e.clone(), gain, tolerance, most, |e| transport.apply(e, extra));
         (e, convergence, norm)
     }
 
@@ -397,6 +466,9 @@ pub(crate) fn mean(e: &[Rgb]) -> Rgb {
     Rgb::from(sum.map(|s| (s / e.len().max(1) as f64) as f32))
 }
 
+/// A cluster, its member furthest from the site, and the length of surface that the site stands for, m.
+type Member = (usize, VertexId, f32);
+
 /// Vertices without a site of their own, by the site that speaks for them.
 struct Clusters {
     /// The vertex of the site, and those that it speaks for.
@@ -436,11 +508,11 @@ impl Clusters {
         Clusters { members }
     }
 
-    /// From each of the clusters `which`, the member furthest from the site: tests, and the cluster of each.
-    fn furthest(&self, refiner: &Refiner, which: &[usize]) -> (Vec<Test>, Vec<(usize, VertexId)>) {
+    /// From each of the clusters `which`, the member furthest from the site, unless it is too near to matter.
+    fn furthest(&self, refiner: &Refiner, which: &[usize]) -> Vec<Member> {
         let vertices = &refiner.elements.vertices;
         let least = 2.0 * refiner.h_min / refiner.radius;
-        let found: Vec<(usize, VertexId, f32)> = which
+        which
             .par_iter()
             .filter_map(|&c| {
                 let (site, members) = &self.members[c];
@@ -449,35 +521,23 @@ impl Clusters {
                 };
                 let (v, d2) =
                     members.iter().map(far).max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))?;
-                (d2.sqrt() > least).then_some((c, v, d2.sqrt()))
+                (d2.sqrt() > least).then_some((c, v, 2.0 * d2.sqrt() * refiner.radius))
             })
-            .collect();
-        let tests = found
-            .iter()
-            .map(|&(c, vertex, d)| Test {
-                vertex,
-                from: vec![(self.members[c].0, 1.0)],
-                length: 2.0 * d * refiner.radius,
-                parted: false,
-            })
-            .collect();
-        (tests, found.iter().map(|&(c, v, _)| (c, v)).collect())
+            .collect()
     }
 
     /// Gives every tested vertex a cluster of its own with the members nearer to it; returns the clusters whose test failed.
-    fn divide(&mut self, refiner: &Refiner, tested: &[(usize, VertexId)], failed: &[bool]) -> Vec<usize> {
+    fn divide(&mut self, refiner: &Refiner, tested: &[Member], failed: &[bool]) -> Vec<usize> {
         let vertices = &refiner.elements.vertices;
         let mut open = Vec::new();
-        for &(c, t) in tested {
+        for &(c, t, _) in tested {
             let site = self.members[c].0;
             let all = std::mem::take(&mut self.members[c].1);
-            let nearer = |v: VertexId| {
-                let at = &vertices[v as usize];
-                distance2(at, &vertices[t as usize], refiner.radius)
-                    < distance2(at, &vertices[site as usize], refiner.radius)
+            let from = |v: VertexId, w: VertexId| {
+                distance2(&vertices[v as usize], &vertices[w as usize], refiner.radius)
             };
             let (taken, kept): (Vec<_>, Vec<_>) =
-                all.into_iter().filter(|&v| v != t).partition(|&v| nearer(v));
+                all.into_iter().filter(|&v| v != t).partition(|&v| from(v, t) < from(v, site));
             self.members[c].1 = kept;
             self.members.push((t, taken));
             if failed[t as usize] {

@@ -21,6 +21,8 @@ pub struct Config {
     pub cluster_radius: f32,
     /// Rounds of refinement at most.
     pub rounds: u32,
+    /// Sites gathered at most; the first mesh takes what it needs.
+    pub most_sites: usize,
     /// Vertices of the element mesh at most; input with more keeps its own.
     pub most_vertices: usize,
     /// Landings of gather rays kept at most, 16 bytes each; sites gathered when they run out get fewer rays.
@@ -48,6 +50,7 @@ impl Config {
             h_min: 0.004,
             cluster_radius: 0.02,
             rounds: 5,
+            most_sites: (1200.0 / error.max(1e-4)) as usize,
             most_vertices: 2_000_000,
             most_landings: 96_000_000,
             solve_tolerance: 0.1 * error,

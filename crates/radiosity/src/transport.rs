@@ -84,7 +84,8 @@ fn keep_contracting(row: &mut [Located]) {
     let excess = sum.map(|s| (LARGEST_ROW_SUM / s.max(1e-30)).min(1.0));
     if excess != Rgb::WHITE {
         for landing in row {
-            landing.weight = (Rgb::from(landing.weight.map(f32::from)) * excess).to_array().map(f16::from_f32);
+            landing.weight =
+                (Rgb::from(landing.weight.map(f32::from)) * excess).to_array().map(f16::from_f32);
         }
     }
 }
@@ -127,16 +128,21 @@ impl<'a> Transport<'a> {
     /// One more bounce: E at every site from `e` at every site, both lx: D + K (e + c), with `extra` the irradiance
     /// c at each slot that e does not hold (caustics).
     pub fn apply(&self, e: &[Rgb], extra: &[Rgb]) -> Vec<Rgb> {
+        let mut sum = self.reflect(e, extra);
+        sum.par_iter_mut().zip(&self.field.sites).for_each(|(sum, site)| *sum += site.row.direct);
+        sum
+    }
+
+    /// K (e + extra) alone.
+    pub fn reflect(&self, e: &[Rgb], extra: &[Rgb]) -> Vec<Rgb> {
         let mut values = self.field.spread(e);
         if !extra.is_empty() {
             values.par_iter_mut().zip(extra).for_each(|(v, &c)| *v += c);
         }
-        self.field
-            .sites
+        self.rows
             .par_iter()
-            .zip(&self.rows)
-            .map(|(site, row)| {
-                let mut sum = site.row.direct;
+            .map(|row| {
+                let mut sum = Rgb::BLACK;
                 for landing in row {
                     let [a, b, c] = self.elements.nodes[landing.node as usize].vertices;
                     let (wa, wb) =

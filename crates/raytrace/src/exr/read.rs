@@ -29,7 +29,7 @@ pub fn read_rgb(path: &Path) -> std::result::Result<Image, Error> {
 }
 
 /// Reads a reference, and its two independent halves if they lie beside it: `box.a.exr` and `box.b.exr` beside
-/// `box.exr`.
+/// `box.exr`. Where only the halves are there, the reference is their mean.
 pub fn read_reference(path: &Path) -> std::result::Result<Reference, Error> {
     let beside = |half: &str| match path.extension() {
         Some(e) if e == "exr" => path.with_extension(format!("{half}.exr")),
@@ -40,7 +40,14 @@ pub fn read_reference(path: &Path) -> std::result::Result<Reference, Error> {
         true => Some((read_rgb(&a)?, read_rgb(&b)?)),
         false => None,
     };
-    Ok(Reference { mean: read_rgb(path)?, halves })
+    let mean = match &halves {
+        Some((a, b)) if !path.is_file() && a.pixels.len() == b.pixels.len() => {
+            let pixels = a.pixels.iter().zip(&b.pixels).map(|(&a, &b)| (a + b) * 0.5).collect();
+            Image { pixels, ..*a }
+        }
+        _ => read_rgb(path)?,
+    };
+    Ok(Reference { mean, halves })
 }
 
 /// Reads the layer `name`: its R, G, B, or X, Y, Z, or its only channel three times. A layer is a prefix of the
