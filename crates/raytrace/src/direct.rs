@@ -115,7 +115,7 @@ pub struct Direct {
     pub irradiance: Rgb,
     /// Visible share of the unshadowed irradiance, [0, 1].
     pub visible: f32,
-    /// Estimated variance of the luminance of `diffuse`, (cd/m²)².
+    /// Estimated variance of the luminance of `diffuse` and `glossy`, (cd/m²)².
     pub variance: f32,
 }
 
@@ -180,6 +180,7 @@ struct Part {
     diffuse: Rgb,
     glossy: Rgb,
     lit2: f32,
+    glossy2: f32,
 }
 
 impl Part {
@@ -220,7 +221,9 @@ impl Part {
                 }
                 _ => 1.0,
             };
-            self.glossy += f_glossy * open * s.radiance * (cos.abs() / s.pdf * weight);
+            let shown = f_glossy * open * s.radiance * (cos.abs() / s.pdf * weight);
+            self.glossy += shown;
+            self.glossy2 += shown.luminance() * shown.luminance();
         }
     }
 
@@ -241,6 +244,10 @@ impl Part {
         out.irradiance += lit;
         out.diffuse += sent;
         out.glossy += self.glossy / n;
+        if self.count > 1 {
+            let mean = self.glossy.luminance() / n;
+            out.variance += (self.glossy2 / n - mean * mean).max(0.0) / (n - 1.0);
+        }
         *unshadowed += estimate * ratio;
         if let (Some(_), true) = (exact, estimate > 0.0) {
             // Seen or not seen, as a coin with the visible share; strata leave about half of a coin's variance.
@@ -328,7 +335,13 @@ fn stratum(k: u32, n: u32, phase: u32, rng: &mut Rng) -> [f32; 2] {
     let k = k % (side * side);
     let (block_x, block_y) = (k % side, k / side);
     let inside = 8 / side;
-    let (px, py) = (phase % 4 % inside, phase / 4 % inside);
+    // Four pixels complete the 16 samples of each, 16 pixels the 4: the high bits of the phase differ between the
+    // neighbours in each 2 × 2 of them, all bits within 4 × 4.
+    let (px, py) = match side {
+        2 => (phase % 4, phase / 4),
+        4 => (phase / 4 % 2, phase / 8),
+        _ => (0, 0),
+    };
     let x = (block_x * inside + px) as f32 + jx;
     let y = (block_y * inside + py) as f32 + jy;
     [(x * 0.125).min(1.0 - f32::EPSILON), (y * 0.125).min(1.0 - f32::EPSILON)]

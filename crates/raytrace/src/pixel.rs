@@ -127,7 +127,7 @@ pub fn shade(hybrid: &Hybrid, view: &View, x: u32, y: u32, effort: Effort, seed:
     let mut largest = 0;
     for g in &groups {
         let before = shot.pixel.beauty().luminance();
-        one_surface(hybrid, g, &hits, effort, share, phase(x, y), &mut shot, &mut rng);
+        one_surface(hybrid, g, &hits, effort, share, phase(x, y, seed), &mut shot, &mut rng);
         let part = g.hits.len() as f32 * share;
         levels.push((part, (shot.pixel.beauty().luminance() - before) / part));
         if g.hits.len() > largest {
@@ -144,10 +144,14 @@ pub fn shade(hybrid: &Hybrid, view: &View, x: u32, y: u32, effort: Effort, seed:
     shot
 }
 
-/// Place of a pixel in the 4 × 4 pattern whose members are spread as evenly as Bayer's matrix does.
-fn phase(x: u32, y: u32) -> u32 {
+/// Place of a pixel in the 4 × 4 pattern whose members are spread as evenly as Bayer's matrix does, turned on by a
+/// random amount in each block of 4 × 4: a pattern that stood still would show every pixel of a row the same part of
+/// a lamp. In a highlight one row high that made 28 % too little light, measured.
+fn phase(x: u32, y: u32, seed: u64) -> u32 {
     const BAYER: [u32; 16] = [0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5];
-    BAYER[(4 * (y % 4) + x % 4) as usize]
+    let block = u64::from(y / 4) << 32 | u64::from(x / 4);
+    let turn = (Rng::new(seed ^ 0x0070_6861_7365, block).f32() * 16.0) as u32;
+    (BAYER[(4 * (y % 4) + x % 4) as usize] + turn) % 16
 }
 
 /// The first surface that is there: past what an alpha mask cuts out.
