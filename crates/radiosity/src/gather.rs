@@ -120,12 +120,7 @@ fn lamps_through(
     if brought.max_channel() <= 0.0 || !brought.is_finite() {
         return Rgb::BLACK;
     }
-    let away = if beyond { -surface.ng } else { surface.ng };
-    let ray = Ray {
-        t_max: light.distance * (1.0 - 1e-4),
-        ..Ray::new(offset_origin(surface.position, away), light.wi)
-    };
-    brought * world.transmittance(&ray)
+    brought * world.transmittance(&light.shadow_ray(surface.position, surface.ng))
 }
 
 /// A place to gather at: a point with the geometric normal of its facet, on the side of interest.
@@ -191,10 +186,7 @@ pub fn direct(world: &World, origins: &[Origin], ns: Vec3, samples: u32, seed: u
         if cos <= 0.0 || light.wi.dot(origin.ng) <= 0.0 {
             continue;
         }
-        let ray = Ray {
-            t_max: light.distance * (1.0 - 1e-4),
-            ..Ray::new(offset_origin(origin.position, origin.ng), light.wi)
-        };
+        let ray = light.shadow_ray(origin.position, origin.ng);
         let brought = light.radiance * (cos / light.pdf);
         if brought.is_finite() && !brought.is_black() {
             sum += brought * world.transmittance(&ray);

@@ -84,8 +84,18 @@ impl LightSample {
     pub fn shadow_ray(&self, p: Vec3, ng: Vec3) -> Ray {
         let side = if self.wi.dot(ng) < 0.0 { -ng } else { ng };
         let origin = if ng == Vec3::ZERO { p } else { offset_origin(p, side) };
-        // Short of the light by more than rounding, and than the offset of the origin.
-        Ray { origin, direction: self.wi, t_min: 0.0, t_max: self.distance * (1.0 - 1e-4) }
+        if !self.distance.is_finite() {
+            return Ray::new(origin, self.wi);
+        }
+        // The offset may be longer than what one would leave free before the light (8 mm at 300 m from the world's
+        // origin): the way is measured from where the ray starts. Free are 0.01 % of it, and what coordinates of this
+        // size round by.
+        let light = p + self.wi * self.distance;
+        let way = light - origin;
+        let length = way.length();
+        let rounding = 4.0 * f32::EPSILON * light.abs().max(origin.abs()).max_element();
+        let t_max = (length * (1.0 - 1e-4) - rounding).max(0.0);
+        Ray { origin, direction: if length > 0.0 { way / length } else { self.wi }, t_min: 0.0, t_max }
     }
 }
 
