@@ -1,1 +1,6 @@
 //! Whole-system tests; each module asks one kind of question.
+
+mod agreement;
+mod analytic;
+mod property;
+mod statistical;

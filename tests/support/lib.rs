@@ -1,1 +1,8 @@
-//! What the whole-system tests share.
+//! What the whole-system tests share: scenes built in code, pictures of them, and how pictures are judged.
+
+pub mod blocks;
+pub mod build;
+pub mod files;
+pub mod picture;
+pub mod solved;
+pub mod stuff;

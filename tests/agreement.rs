@@ -1,0 +1,106 @@
+//! Radiosity and paths, which share little but rays, must give one picture of every scene we ship.
+//!
+//! Each comparison: blocks of 8 × 8 pixels and the mean luminance, by the variance that both pictures state, and beyond
+//! it what the two passes are allowed: 1 % of the mean, and in a block a few per cent of its light.
+
+use geometry::{Camera, World};
+use raytrace::{Film, Settings};
+use std::sync::OnceLock;
+use support::blocks::compare;
+use support::files::{asset, load, shared};
+use support::picture::{hybrid, mean, mean_of, path, shoot, shoot_with, solve};
+
+/// Cornell box by paths, for several tests: 48 × 48, 256 paths a pixel, standard error of the mean 0.1 %.
+fn cornell() -> &'static (World, Camera, Film) {
+    static ONCE: OnceLock<(World, Camera, Film)> = OnceLock::new();
+    ONCE.get_or_init(|| {
+        let (scene, mut cameras) = asset("cornell-box.gltf");
+        let (world, eye) = (World::new(scene), cameras.swap_remove(0));
+        let film = shoot(&world, &eye, &path(48, 48, 256));
+        (world, eye, film)
+    })
+}
+
+/// Every camera of the asset `name`: the two passes asked for 2 %, against `spp` paths a pixel.
+fn agrees(name: &str, size: (u32, u32), spp: u32, bias: f64, block: f64) {
+    let (scene, cameras) = asset(name);
+    let world = World::new(scene);
+    let settings = Settings { gather_rays: Some(128), ..hybrid(size.0, size.1, 0.02) };
+    let solution = solve(&world, &settings);
+    for eye in &cameras {
+        let two_pass = shoot_with(&world, eye, Some(&solution), &settings);
+        let c = compare(&two_pass, &shoot(&world, eye, &path(size.0, size.1, spp)));
+        println!("{name}, {}: {c:?}", eye.name);
+        assert!(c.agrees(bias, block), "{name}, {}: {c:?}", eye.name);
+    }
+}
+
+#[test]
+fn the_cornell_box() {
+    let (world, eye, reference) = cornell();
+    let two_pass = shoot(world, eye, &hybrid(48, 48, 0.02));
+    let c = compare(&two_pass, reference);
+    println!("cornell-box: {c:?}");
+    assert!(c.agrees(0.01, 0.03), "{c:?}");
+    // Layer by layer too, so that no light is merely in the wrong one: within 1.5 % of the picture's mean.
+    for (name, layer) in [
+        ("direct", (|p| p.direct) as fn(&raytrace::Pixel) -> geometry::Rgb),
+        ("indirect", |p| p.indirect),
+        ("specular", |p| p.specular),
+        ("emission", |p| p.emission),
+    ] {
+        let (a, b) = (mean_of(&two_pass, layer), mean_of(reference, layer));
+        println!("cornell-box, {name}: {a:.3} against {b:.3}");
+        assert!((a - b).abs() < 0.015 * mean(reference), "{name}: {a} against {b}");
+    }
+}
+
+/// The comparison above is sharp: with every reflectance 5 % higher it finds the difference.
+#[test]
+fn five_per_cent_of_albedo_are_noticed() {
+    let (world, eye, reference) = cornell();
+    let mut scene = world.scene.clone();
+    scene.materials.iter_mut().for_each(|m| m.base_color *= 1.05);
+    let brighter = shoot(&World::new(scene), eye, &hybrid(48, 48, 0.02));
+    let c = compare(&brighter, reference);
+    println!("albedo × 1.05: {c:?}");
+    assert!(!c.agrees(0.01, 0.03) && c.bias > 0.02, "{c:?}");
+}
+
+/// Mirror and glass balls: what paths find of their caustics by chance, photons bring at once, smoothed over 2 cm.
+#[test]
+fn the_cornell_box_with_mirror_and_glass() {
+    agrees("cornell-specular.gltf", (48, 48), 256, 0.01, 0.05);
+}
+
+#[test]
+fn both_furnaces() {
+    for name in ["furnace.gltf", "furnace-mixed.gltf"] {
+        agrees(name, (24, 24), 64, 0.005, 0.005);
+    }
+}
+
+/// Textures, gloss, windows, a sky and many lamps, from every camera.
+#[test]
+fn the_gallery() {
+    agrees("gallery.glb", (48, 32), 96, 0.01, 0.05);
+}
+
+/// The measured Cornell box against another renderer's picture of the same file (Mitsuba 3): mean luminance within 3 %.
+#[test]
+fn another_renderer_sees_the_same_cornell_box() {
+    let (Some(file), Some(picture)) = (
+        shared("scenes/interiors/cornell-measured.glb"),
+        shared("scenes/interiors/reference/cornell-measured.mitsuba.exr"),
+    ) else {
+        return;
+    };
+    let (scene, cameras) = load(&file);
+    let theirs = raytrace::exr::read_rgb(&picture).expect("the reference can be read");
+    let height = (64 * theirs.height).div_ceil(theirs.width);
+    let ours = shoot(&World::new(scene), &cameras[0], &hybrid(64, height, 0.02));
+    let by_them =
+        theirs.pixels.iter().map(|p| f64::from(p.luminance())).sum::<f64>() / theirs.pixels.len() as f64;
+    println!("cornell-measured: {} against {by_them}", mean(&ours));
+    assert!((mean(&ours) / by_them - 1.0).abs() < 0.03, "{} against {by_them}", mean(&ours));
+}

@@ -1,0 +1,5 @@
+//! What pencil and paper give, within the method's stated error.
+
+mod enclosures;
+mod optics;
+mod shadows;

@@ -1,0 +1,65 @@
+//! Whether what is random has the mean and the spread that it states.
+//!
+//! Samples are independent and seeds fixed; z by the measured variance, |z| < 4.9, so one false alarm in a million each.
+
+use geometry::World;
+use raytrace::{DiffuseMode, Film, Settings};
+use support::blocks::ALARM;
+use support::files::asset;
+use support::picture::{hybrid, path, shoot};
+
+/// The variance layer of the reference is that of its pixels: squared differences of two independent pictures over the
+/// sum of their variances average 1. Over 24² pixels of 64 paths the average has a standard error of 6 % (√(2/576)), or
+/// rather more where a few paths carry much of the light: an error of a third would be found.
+#[test]
+fn the_variance_of_paths_is_as_stated() {
+    let (scene, cameras) = asset("cornell-box.gltf");
+    let world = World::new(scene);
+    let [a, b] = [1, 2].map(|seed| shoot(&world, &cameras[0], &Settings { seed, ..path(24, 24, 64) }));
+    let ratio = |(p, q): (&raytrace::Pixel, &raytrace::Pixel)| {
+        let d = p.beauty().luminance() - q.beauty().luminance();
+        let v = p.variance + q.variance;
+        (v > 0.0).then(|| f64::from(d * d / v))
+    };
+    let ratios: Vec<f64> = a.pixels.iter().zip(&b.pixels).filter_map(ratio).collect();
+    let average = ratios.iter().sum::<f64>() / ratios.len() as f64;
+    println!("squared differences over stated variance: {average} of {} pixels", ratios.len());
+    assert!(ratios.len() > 500 && (average - 1.0).abs() < 0.33, "{average}");
+}
+
+/// Pixels of `film` in which no lamp is seen: the edges of a lamp, fifty times as bright as the room, would drown the
+/// rest in their noise.
+fn without_lamps(film: &Film) -> Vec<usize> {
+    (0..film.pixels.len()).filter(|&i| film.pixels[i].emission.is_black()).collect()
+}
+
+fn mean_over(film: &Film, pixels: &[usize]) -> f64 {
+    pixels.iter().map(|&i| f64::from(film.pixels[i].beauty().luminance())).sum::<f64>() / pixels.len() as f64
+}
+
+/// Sixteen prepasses and pictures of the two passes, each with its own seed: their mean luminance is that of the paths, by
+/// Student's t with the fifteen degrees of freedom that they leave (|t| < 7.8 is one alarm in a million). The mesh's
+/// own error is the same in all of them, hence the 0.5 % allowed beyond the noise.
+#[test]
+fn the_mean_over_seeds_is_that_of_paths() {
+    let (scene, cameras) = asset("cornell-box.gltf");
+    let world = World::new(scene);
+    let paths = shoot(&world, &cameras[0], &path(16, 16, 1024));
+    let room = without_lamps(&paths);
+    let exact = mean_over(&paths, &room);
+    let se =
+        room.iter().map(|&i| f64::from(paths.pixels[i].variance)).sum::<f64>().sqrt() / room.len() as f64;
+    for mode in [DiffuseMode::Split, DiffuseMode::Gather] {
+        let shoot = |seed| {
+            let settings = Settings { seed, diffuse: mode, gather_rays: Some(64), ..hybrid(16, 16, 0.05) };
+            mean_over(&shoot(&world, &cameras[0], &settings), &room)
+        };
+        let means: Vec<f64> = (0..16).map(shoot).collect();
+        let average = means.iter().sum::<f64>() / 16.0;
+        let variance = means.iter().map(|m| (m - average).powi(2)).sum::<f64>() / 15.0 / 16.0;
+        println!("{mode:?}: {average} ± {} against {exact} ± {se}", variance.sqrt());
+        let noise = ((7.8 * variance.sqrt()).powi(2) + (ALARM * se).powi(2)).sqrt();
+        assert!((average - exact).abs() < noise + 0.005 * exact, "{mode:?}: {average}, not {exact}");
+        assert!(noise < 0.02 * exact, "the test finds 2.5 %: {noise} of {exact}");
+    }
+}
