@@ -73,13 +73,6 @@ fn the_cornell_box_with_mirror_and_glass() {
     agrees("cornell-specular.gltf", (48, 48), 256, 0.01, 0.05);
 }
 
-#[test]
-fn both_furnaces() {
-    for name in ["furnace.gltf", "furnace-mixed.gltf"] {
-        agrees(name, (24, 24), 64, 0.005, 0.005);
-    }
-}
-
 /// Textures, gloss, windows, a sky and many lamps, from every camera.
 #[test]
 fn the_gallery() {

@@ -6,7 +6,7 @@ use geometry::World;
 use raytrace::{DiffuseMode, Film, Settings};
 use support::blocks::ALARM;
 use support::files::asset;
-use support::picture::{hybrid, path, shoot};
+use support::picture::{hybrid, path, shoot, shoot_with, solve};
 
 /// The variance layer of the reference is that of its pixels: squared differences of two independent pictures over the
 /// sum of their variances average 1. Over 24² pixels of 64 paths the average has a standard error of 6 % (√(2/576)), or
@@ -49,12 +49,19 @@ fn the_mean_over_seeds_is_that_of_paths() {
     let exact = mean_over(&paths, &room);
     let se =
         room.iter().map(|&i| f64::from(paths.pixels[i].variance)).sum::<f64>().sqrt() / room.len() as f64;
-    for mode in [DiffuseMode::Split, DiffuseMode::Gather] {
-        let shoot = |seed| {
-            let settings = Settings { seed, diffuse: mode, gather_rays: Some(64), ..hybrid(16, 16, 0.05) };
-            mean_over(&shoot(&world, &cameras[0], &settings), &room)
-        };
-        let means: Vec<f64> = (0..16).map(shoot).collect();
+    let modes = [DiffuseMode::Split, DiffuseMode::Gather];
+    let runs: Vec<[f64; 2]> = (0..16)
+        .map(|seed| {
+            let settings = Settings { seed, gather_rays: Some(64), ..hybrid(16, 16, 0.05) };
+            let solution = solve(&world, &settings);
+            modes.map(|diffuse| {
+                let settings = Settings { diffuse, ..settings.clone() };
+                mean_over(&shoot_with(&world, &cameras[0], Some(&solution), &settings), &room)
+            })
+        })
+        .collect();
+    for (k, mode) in modes.into_iter().enumerate() {
+        let means: Vec<f64> = runs.iter().map(|run| run[k]).collect();
         let average = means.iter().sum::<f64>() / 16.0;
         let variance = means.iter().map(|m| (m - average).powi(2)).sum::<f64>() / 15.0 / 16.0;
         println!("{mode:?}: {average} ± {} against {exact} ± {se}", variance.sqrt());

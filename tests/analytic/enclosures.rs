@@ -113,16 +113,19 @@ fn furnaces_are_plain_white() {
     for name in ["furnace.gltf", "furnace-mixed.gltf"] {
         let (scene, cameras) = asset(name);
         let world = World::new(scene);
-        let film = shoot(&world, &cameras[0], &Settings { gather_rays: Some(64), ..hybrid(32, 32, 0.02) });
-        let mut white = film.clone();
-        for p in &mut white.pixels {
-            *p = raytrace::Pixel { emission: Rgb::WHITE, ..raytrace::Pixel::default() };
+        for settings in [Settings { gather_rays: Some(64), ..hybrid(32, 32, 0.02) }, path(32, 32, 64)] {
+            let film = shoot(&world, &cameras[0], &settings);
+            let mut white = film.clone();
+            for p in &mut white.pixels {
+                *p = raytrace::Pixel { emission: Rgb::WHITE, ..raytrace::Pixel::default() };
+            }
+            let c = compare(&film, &white);
+            let square = luminance(&film).iter().map(|y| (y - 1.0).powi(2)).sum::<f64>() / 1024.0;
+            println!("{name}, {:?}: rms {}, {c:?}", settings.integrator, square.sqrt());
+            assert!(c.agrees(0.005, 0.005), "{name}, {:?}: {c:?}", settings.integrator);
+            // Noise alone: the paths leave 2.4 %, the two passes 3.4 % where 2 % was asked for.
+            assert!(square.sqrt() < 0.06, "{name}, {:?}: {}", settings.integrator, square.sqrt());
         }
-        let c = compare(&film, &white);
-        println!("{name}: {c:?}");
-        assert!(c.agrees(0.005, 0.005), "{name}: {c:?}");
-        let rms = luminance(&film).iter().map(|y| (y - 1.0).powi(2)).sum::<f64>() / 1024.0;
-        assert!(rms.sqrt() < 0.05, "{name}: rms {}", rms.sqrt());
     }
 }
 
