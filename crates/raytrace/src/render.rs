@@ -277,9 +277,6 @@ impl Ladder {
                             camera |= step * step > self.target * den;
                         }
                     }
-                    shadow |= shot.visible > 0.01
-                        && shot.visible < 0.99
-                        && relative(shot.light_variance) > 0.25 * self.target;
                 }
                 let next = Effort {
                     camera: if camera {
