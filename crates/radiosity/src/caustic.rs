@@ -165,7 +165,7 @@ impl Caustics {
     }
 }
 
-/// Bounding spheres of the pieces of surface that reflect or refract sharply, the largest few hundred.
+/// Bounding spheres of the pieces of surface that reflect or refract sharply, the largest few.
 fn targets(world: &World, elements: &Elements) -> Vec<(Vec3, f32)> {
     let mesh = &world.scene.mesh;
     let sharp: Vec<bool> = world
@@ -188,7 +188,7 @@ fn targets(world: &World, elements: &Elements) -> Vec<(Vec3, f32)> {
     let mut spheres: Vec<(Vec3, f32)> =
         bounds.into_iter().flatten().map(|(lo, hi)| (0.5 * (lo + hi), 0.5 * (hi - lo).length())).collect();
     spheres.sort_by(|a, b| b.1.total_cmp(&a.1));
-    spheres.truncate(256);
+    spheres.truncate(32); // each particle weighs all of them
     spheres
 }
 

@@ -63,6 +63,17 @@ impl Field {
         self.sources.par_iter().map(value).collect()
     }
 
+    /// Estimated variance of a slot's value (mean of the channels) from the rays that were gathered, lx².
+    pub fn variance(&self, slot: usize) -> f32 {
+        match &self.sources[slot] {
+            Source::Nothing => 0.0,
+            Source::Site(i) => self.sites[*i as usize].row.variance,
+            Source::Near(sites, weights) => {
+                sites.iter().zip(weights).map(|(&i, w)| w * w * self.sites[i as usize].row.variance).sum()
+            }
+        }
+    }
+
     /// Largest difference (mean of the channels) among the sites that a slot is interpolated from; 0 for one of its own.
     pub fn spread_around(&self, slot: usize, e: &[Rgb]) -> f32 {
         let Source::Near(sites, weights) = &self.sources[slot] else { return 0.0 };

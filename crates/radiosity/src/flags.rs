@@ -6,7 +6,7 @@ use geometry::{Ray, Vec3, World, triangle};
 
 /// Something stands across the leaf: its corners may not see each other.
 const PIERCED: u8 = 1;
-/// The light on it is not linear, or a corner of it says nothing.
+/// The light on it bends more sharply than the mesh can follow.
 const UNRESOLVED: u8 = 2;
 
 /// For each node and side, what is wrong with it.
@@ -42,9 +42,9 @@ impl Flags {
         self.bits.is_empty()
     }
 
-    /// Whether anything is wrong.
-    pub fn any(&self, node: u32, side: Side) -> bool {
-        self.get(node, side) != 0
+    /// Whether the light on it bends more sharply than the mesh can follow.
+    pub fn unresolved(&self, node: u32, side: Side) -> bool {
+        self.get(node, side) & UNRESOLVED != 0
     }
 
     /// Whether something stands across the leaf.

@@ -10,8 +10,8 @@ use crate::flags::{Flags, visible_weights};
 use crate::gather::{self, Origin};
 use crate::reach::Reach;
 use crate::solve::{Config, Progress};
-use crate::solver::{self, Convergence};
-use crate::transport::{Landing, Transport};
+use crate::solver::{self, Convergence, Gain};
+use crate::transport::{Landing, Row, Transport};
 use geometry::math::offset_origin;
 use geometry::sampling::Lattice2;
 use geometry::{Ray, Rgb, World, triangle};
@@ -220,13 +220,20 @@ impl<'a> Refiner<'a> {
             .map(|&side| {
                 let got = values[slot(test.vertex, side)];
                 let known = test.from.iter().filter(|(v, _)| self.field.usable(slot(*v, side)));
-                let (sum, weight) =
-                    known.fold((Rgb::BLACK, 0.0), |(s, w), &(v, k)| (s + values[slot(v, side)] * k, w + k));
+                let (sum, weight, known_variance) =
+                    known.fold((Rgb::BLACK, 0.0, 0.0), |(s, w, n), &(v, k)| {
+                        let slot = slot(v, side);
+                        (s + values[slot] * k, w + k, n + k * k * self.field.variance(slot))
+                    });
                 if weight <= 0.0 {
                     return 1.0; // nothing around it speaks for it
                 }
                 let predicted = sum / weight;
-                (got - predicted).map(f32::abs).mean() / (0.5 * (got + predicted).mean() + floor).max(1e-30)
+                let difference = (got - predicted).map(f32::abs).mean();
+                // What the rays' own noise explains is no bend of the light.
+                let noise = known_variance / (weight * weight) + self.field.variance(slot(test.vertex, side));
+                let bend = (difference * difference - noise).max(0.0).sqrt();
+                bend / (0.5 * (got + predicted).mean() + floor).max(1e-30)
             })
             .fold(0.0, f32::max)
     }
@@ -308,27 +315,53 @@ impl<'a> Refiner<'a> {
             .filter(|&(v, side)| self.reach.alive(self.elements.vertices[v as usize].piece, side))
             .filter(|(v, _)| origins.contains_key(v))
             .collect();
-        let room =
-            self.config.most_landings.saturating_sub(self.field.sites.len() * self.config.rays as usize);
-        let rays = self.config.rays.min((room / jobs.len().max(1)) as u32).max(16);
-        let pattern = Lattice2::new(rays);
+        let mut rays = self.config.rays;
+        let mut rows = self.gather_rows(&jobs, &origins, rays);
+        // Where few rays find the light (a sunny patch, a lamp behind a shade) it takes more of them.
+        for _ in 0..2 {
+            rays *= 4;
+            let all = self.field.sites.iter().map(|s| &s.row).chain(&rows).map(|r| r.direct);
+            let floor = 0.1 * mean(&all.collect::<Vec<_>>()).mean();
+            let noisy = |r: &Row| r.variance.sqrt() > self.config.noise * (r.direct.mean() + floor);
+            let which: Vec<usize> = (0..rows.len()).filter(|&i| noisy(&rows[i])).collect();
+            if which.is_empty() || self.progress.stopped() {
+                break;
+            }
+            let again: Vec<(VertexId, Side)> = which.iter().map(|&i| jobs[i]).collect();
+            for (i, row) in which.into_iter().zip(self.gather_rows(&again, &origins, rays)) {
+                rows[i] = row;
+            }
+        }
+        self.e.extend(rows.iter().map(|row| row.direct));
+        let sites = jobs.into_iter().zip(rows).map(|((vertex, side), row)| Site { vertex, side, row });
+        self.field.sites.extend(sites);
+        self.field.connect(self.world, &self.elements, self.radius);
+    }
+
+    /// Rows of `rays` rays each, fewer where landings would take more memory than they may.
+    fn gather_rows(
+        &self,
+        jobs: &[(VertexId, Side)],
+        origins: &HashMap<VertexId, Vec<Origin>>,
+        rays: u32,
+    ) -> Vec<Row> {
+        let held: usize = self.field.sites.iter().map(|s| s.row.landings.len()).sum();
+        let room = self.config.most_landings.saturating_sub(held) / jobs.len().max(1);
+        let pattern = Lattice2::new(rays.min(room as u32).max(16));
         self.progress.stage("gathering", jobs.len() as u64);
         let dead =
             |t: u32, side: Side| self.elements.piece(t).is_none_or(|piece| !self.reach.alive(piece, side));
-        let sites: Vec<Site> = jobs
-            .par_iter()
+        jobs.par_iter()
             .map(|&(vertex, side)| {
                 let turned = turned(&origins[&vertex], side);
                 let normal = self.elements.vertices[vertex as usize].normal * side.sign();
-                let stream = slot(vertex, side) as u64;
+                // Another number of rays draws other numbers: a row that is done again shares nothing with the first.
+                let stream = (u64::from(rays) << 40) ^ slot(vertex, side) as u64;
                 let row = gather::row(self.world, &turned, normal, &pattern, self.config.seed, stream, dead);
                 self.progress.advance(1);
-                Site { vertex, side, row }
+                row
             })
-            .collect();
-        self.e.extend(sites.iter().map(|s| s.row.direct));
-        self.field.sites.extend(sites);
-        self.field.connect(self.world, &self.elements, self.radius);
+            .collect()
     }
 
     /// For each of `vertices`, points just inside the facets around it.
@@ -375,10 +408,9 @@ impl<'a> Refiner<'a> {
         });
         let norm = transport.norm();
         // While the mesh is being refined a rough bound will do.
-        let gain = if flags.is_empty() {
-            1.0 / (1.0 - norm.min(0.9))
-        } else {
-            solver::gain(self.e.len(), |e| transport.reflect(e, &[]))
+        let gain = match flags.is_empty() {
+            true => Gain::of_norm(norm.min(0.9)),
+            false => solver::gain(self.e.len(), |e| transport.reflect(e, &[])),
         };
         let (e, convergence) =
             solver::solve(self.e.clone(), gain, tolerance, most, |e| transport.apply(e, extra));
@@ -396,7 +428,7 @@ impl<'a> Refiner<'a> {
             if !self.reach.alive(self.elements.vertices[corners[0] as usize].piece, side) {
                 return (false, false);
             }
-            let coarse = corners.iter().any(|&v| unresolved[v as usize] || !self.field.usable(slot(v, side)));
+            let coarse = corners.iter().any(|&v| unresolved[v as usize]);
             (self.pierced(n, side), coarse)
         })
     }

@@ -168,7 +168,7 @@ impl Solution {
     /// Whether the mesh does not resolve the light at this place, and the one who asks should gather for itself.
     pub fn unresolved(&self, triangle: u32, u: f32, v: f32, side: Side) -> bool {
         let (node, _) = self.elements.locate(triangle, u, v);
-        self.flags.any(node, side)
+        self.flags.unresolved(node, side)
     }
 
     fn interpolate(&self, world: &World, triangle: u32, u: f32, v: f32, side: Side, values: &[Rgb]) -> Rgb {

@@ -11,6 +11,8 @@ use thiserror::Error;
 pub struct Config {
     /// Rays gathered at each site. Error of E measured in a Cornell box: 64 → 5.7 %, 256 → 1.9 %, 1024 → 0.67 %.
     pub rays: u32,
+    /// Relative noise of a site's own value above which it gets four times as many rays, twice at most.
+    pub noise: f32,
     /// Relative midpoint error × (edge / h0) above which an edge is refined further.
     pub tolerance: f32,
     /// Longest edge of the first mesh.
@@ -27,7 +29,7 @@ pub struct Config {
     pub most_vertices: usize,
     /// Landings of gather rays kept at most, 16 bytes each; sites gathered when they run out get fewer rays.
     pub most_landings: usize,
-    /// No value is to be further from the solved system's than this share of the mean.
+    /// Values are on average to be no further from the solved system's than this share of their mean.
     pub solve_tolerance: f32,
     /// Light samples for the direct irradiance at each site.
     pub light_samples: u32,
@@ -45,6 +47,7 @@ impl Config {
         let rays = (128.0 * (0.033 / error.clamp(1e-4, 0.5)).powf(1.25)).clamp(32.0, 8192.0);
         Config {
             rays: (rays as u32).next_multiple_of(16),
+            noise: 3.0 * error,
             tolerance: (1.2 * error).clamp(0.004, 0.12),
             h0: 0.15,
             h_min: 0.004,

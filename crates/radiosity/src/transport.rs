@@ -61,6 +61,8 @@ pub struct Row {
     pub dead: f32,
     /// What arrived at diffuse surfaces of 1 that set out; by reciprocity, what the light that leaves here brings there.
     pub kept: f32,
+    /// Estimated variance of `direct` (mean of the channels), lx².
+    pub variance: f32,
 }
 
 /// A landing found in the present element mesh: up to three slots with their weights.

@@ -77,7 +77,7 @@ pub struct Shot {
     pub visible: f32,
     /// Variance of the luminance from rays through the pixel: edges, textures, gloss.
     pub camera_variance: f32,
-    /// Variance of the luminance from shadow rays and gathers.
+    /// Variance of the luminance from shadow rays.
     pub light_variance: f32,
     /// A texture or a gloss varies within the pixel: one ray through it does not tell.
     pub fine: bool,
@@ -140,7 +140,7 @@ pub fn shade(hybrid: &Hybrid, view: &View, x: u32, y: u32, effort: Effort, seed:
     let spread: f32 = levels.iter().map(|&(p, l)| p * (l - mean) * (l - mean)).sum();
     // An edge through a jittered grid of n: the share of one side has variance ∝ n^-1.5.
     shot.camera_variance += spread * share.powf(1.5);
-    shot.pixel.variance = shot.camera_variance + shot.light_variance;
+    shot.pixel.variance += shot.camera_variance + shot.light_variance;
     shot
 }
 
@@ -201,7 +201,7 @@ fn one_surface(
     let wo = -ray.direction;
     // A sliver of a pixel needs fewer shadow rays for the same noise in the pixel.
     let shadow = if part < 0.3 && effort.shadow > 4 { effort.shadow / 4 } else { effort.shadow };
-    let quality = Quality { shadow, gather: true };
+    let quality = Quality { shadow, primary: true };
     let (lit, plan) = hybrid.diffuse(surface, wo, quality, phase, rng);
     let albedo = surface.bsdf.diffuse_albedo(wo);
     let textured = varies(hybrid.world, surface.material);
@@ -239,6 +239,7 @@ fn one_surface(
         shot.camera_variance += (square / count - mean * mean).max(0.0) / (count - 1.0) * part * part;
     }
     shot.light_variance += lit.variance * coverage * coverage;
+    p.variance += lit.gather_variance * coverage * coverage;
     if part > 0.49 {
         shot.visible = lit.visible;
     }

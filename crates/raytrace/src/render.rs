@@ -144,7 +144,7 @@ pub fn render(
             };
             report.texts = facts(&solution.report);
             report.radiosity = Some(solution.report.clone());
-            let rays = ((128.0 * (0.02 / settings.error)) as u32).clamp(32, 1024);
+            let rays = ((256.0 * (0.02 / settings.error)) as u32).clamp(64, 1024);
             let hybrid = Hybrid { world, solution, mode: settings.diffuse, pattern: Lattice2::new(rays) };
             hybrid_film(&hybrid, &view, settings, &watch)
         }
@@ -166,7 +166,7 @@ fn facts(r: &radiosity::Report) -> Vec<(String, String)> {
         (
             "radiosity solve",
             format!(
-                "{state} in {} iterations, within {:.2e} lx of the fixed point, largest row sum {:.3}",
+                "{state} in {} iterations, on average within {:.2e} lx of the fixed point, largest row sum {:.3}",
                 c.iterations, c.bound, r.norm
             ),
         ),

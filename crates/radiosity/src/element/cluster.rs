@@ -3,9 +3,11 @@
 //! Two vertices are near when both their places and their normals are: irradiance changes with either.
 //! The distance is `d² = |Δp|²/r² + |Δn|²/σ²`, so 1 is the reach of one gathering vertex.
 
+use super::forest::MixHasher;
 use super::{Vertex, VertexId};
 use geometry::Vec3;
 use std::collections::HashMap;
+use std::hash::BuildHasherDefault;
 
 /// Normals this far apart (chord length, about 29°) count as much as places one radius apart.
 const SIGMA: f32 = 0.5;
@@ -18,22 +20,27 @@ pub fn distance2(a: &Vertex, b: &Vertex, r: f32) -> f32 {
 /// Vertices in cells of one radius, for finding the near ones.
 pub struct Grid {
     cell: f32,
-    cells: HashMap<[i32; 3], Vec<VertexId>>,
+    cells: HashMap<u64, Vec<VertexId>, BuildHasherDefault<MixHasher>>,
 }
 
 impl Grid {
     /// An empty one, for searches within distance 1 at radius `r`.
     pub fn new(r: f32) -> Grid {
-        Grid { cell: r, cells: HashMap::new() }
+        Grid { cell: r, cells: HashMap::default() }
     }
 
-    fn key(&self, p: Vec3) -> [i32; 3] {
+    fn cell_of(&self, p: Vec3) -> [i32; 3] {
         (p / self.cell).floor().to_array().map(|x| x as i32)
+    }
+
+    /// 21 bits of each coordinate: cells 2 million apart share a list, which costs time but no correctness.
+    fn key(cell: [i32; 3]) -> u64 {
+        cell.iter().fold(0, |key, &c| (key << 21) | u64::from(c as u32 & 0x1f_ffff))
     }
 
     /// Adds a vertex.
     pub fn insert(&mut self, vertices: &[Vertex], v: VertexId) {
-        self.cells.entry(self.key(vertices[v as usize].position)).or_default().push(v);
+        self.cells.entry(Self::key(self.cell_of(vertices[v as usize].position))).or_default().push(v);
     }
 
     /// Every vertex within distance 1 of `at`, with that distance squared.
@@ -42,10 +49,10 @@ impl Grid {
         vertices: &'a [Vertex],
         at: &'a Vertex,
     ) -> impl Iterator<Item = (VertexId, f32)> + 'a {
-        let [x, y, z] = self.key(at.position);
+        let [x, y, z] = self.cell_of(at.position);
         (0..27).flat_map(move |i| {
-            let key = [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1];
-            let found = self.cells.get(&key).map_or(&[][..], Vec::as_slice);
+            let cell = [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1];
+            let found = self.cells.get(&Self::key(cell)).map_or(&[][..], Vec::as_slice);
             found.iter().filter_map(move |&v| {
                 let d2 = distance2(at, &vertices[v as usize], self.cell);
                 (d2 < 1.0).then_some((v, d2))

@@ -17,7 +17,7 @@ use radiosity::element::Side;
 use radiosity::gather::{self, ROUGH};
 
 /// Rays of less weight than this live on by chance, in proportion.
-const CUTOFF: f32 = 0.02;
+const CUTOFF: f32 = 0.005;
 /// Surfaces one ray tree passes at most.
 const DEEPEST: u32 = 48;
 /// Both of a glass surface's rays are followed down to this depth, then one by chance.
@@ -31,8 +31,9 @@ const FAINT: f32 = 0.12;
 pub struct Quality {
     /// Shadow rays: see [`Spend`].
     pub shadow: u32,
-    /// Whether to gather at the surface where the mode or an unresolved mesh asks for it.
-    pub gather: bool,
+    /// Whether the eye sees the surface directly: then it gathers where the mode or an unresolved mesh asks for it, and
+    /// photons are looked up one by one.
+    pub primary: bool,
 }
 
 /// Shades surfaces of one world with one solution.
@@ -61,8 +62,10 @@ pub struct Diffuse {
     pub irradiance: Rgb,
     /// Visible share of the unshadowed direct light.
     pub visible: f32,
-    /// Estimated variance of the luminance.
+    /// Estimated variance of the luminance from shadow rays.
     pub variance: f32,
+    /// The same from a gather.
+    pub gather_variance: f32,
 }
 
 impl Hybrid<'_> {
@@ -109,17 +112,25 @@ impl Hybrid<'_> {
         }
         let gathers = match self.mode {
             DiffuseMode::Vertex => false,
-            DiffuseMode::Split => quality.gather && self.solution.unresolved(t, u, v, side),
-            DiffuseMode::Gather => quality.gather,
+            DiffuseMode::Split => quality.primary && self.solution.unresolved(t, u, v, side),
+            DiffuseMode::Gather => quality.primary,
         };
-        let mut e = if gathers {
-            let (e, variance) = self.gather(surface, rng);
-            out.variance += variance * photometry::reflected_radiance(albedo, Rgb::WHITE).luminance().powi(2);
-            e
-        } else {
-            self.solution.irradiance(self.world, t, u, v, side)
-        };
-        e += if from_vertices {
+        let mut e = self.solution.irradiance(self.world, t, u, v, side);
+        if gathers {
+            let (gathered, variance) = self.gather(surface, rng);
+            let difference = gathered - e;
+            // In `split` the gather corrects the vertices, by what its own noise does not explain (James and Stein's
+            // shrinkage); in `gather` it stands for itself.
+            let trust = match self.mode {
+                DiffuseMode::Gather => 1.0,
+                _ => (1.0 - variance / difference.luminance().powi(2).max(1e-30)).max(0.0),
+            };
+            e += difference * trust;
+            let seen = photometry::reflected_radiance(albedo, Rgb::WHITE).luminance();
+            out.gather_variance = trust * trust * variance * seen * seen;
+        }
+        // Only what the eye sees directly, or nearly so, needs a caustic's own sharpness.
+        e += if from_vertices || !quality.primary {
             self.solution.caustic(self.world, t, u, v, side)
         } else {
             self.solution.caustics.irradiance(surface.position, surface.ng)
@@ -267,7 +278,8 @@ impl Hybrid<'_> {
         }
         let shadow = if weight > 0.25 { 4 } else { 1 };
         let phase = (rng.f32() * 16.0) as u32;
-        let (diffuse, plan) = self.diffuse(surface, wo, Quality { shadow, gather: false }, phase, rng);
+        let (diffuse, plan) =
+            self.diffuse(surface, wo, Quality { shadow, primary: weight > 0.5 }, phase, rng);
         diffuse.direct
             + diffuse.indirect
             + diffuse.glossy
