@@ -3,6 +3,29 @@
 //! One space: the importer bakes every transform, so everything here is world space, in metres.
 //! Light is linear, Rec. 709, photometric: emissive in cd/m², lamps in cd, the sun in lx.
 //! No camera is part of the [`Scene`]: light does not know where we stand.
+//!
+//! A [`Scene`] is plain data, read from a file by [`gltf::load`] or filled in by hand. [`World::new`] makes it ready:
+//! it builds the search tree ([`bvh`]) and gathers what shines ([`emitter`]). Rays then ask the world what they meet
+//! ([`World::closest`]) and how much light passes between two points ([`World::transmittance`]); [`Surface`] is the
+//! material at the point met, and its [`bsdf`] says where light goes on from there.
+//!
+//! ```
+//! use geometry::{Material, MaterialId, Ray, Rgb, Scene, Surface, Vec3, World};
+//!
+//! let mut scene = Scene::default();
+//! scene.materials.push(Material { base_color: Rgb::splat(0.5), metallic: 0.0, specular: 0.0, ..Material::default() });
+//! scene.mesh.positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
+//! scene.mesh.normals = vec![Vec3::Z; 3];
+//! scene.mesh.triangles = vec![[0, 1, 2]];
+//! scene.mesh.materials = vec![MaterialId(0)];
+//! let world = World::new(scene);
+//!
+//! let down = Ray::new(Vec3::new(0.2, 0.2, 3.0), -Vec3::Z);
+//! let hit = world.closest(&down).expect("the triangle lies below");
+//! assert!((hit.t - 3.0).abs() < 1e-6);
+//! let surface = Surface::new(&world.scene, &down, &hit);
+//! assert!(surface.front && surface.ng == Vec3::Z);
+//! ```
 
 pub mod bsdf;
 pub mod bvh;

@@ -11,6 +11,18 @@
 //! emitters' own light is not in it, because pass 2 fetches that for each pixel; the light they throw on the
 //! surfaces that a gather ray hits is. Light that arrives from an emitter by way of mirrors and glass alone is
 //! kept apart, as photons ([`caustic`]).
+//!
+//! ```no_run
+//! use radiosity::element::Side;
+//!
+//! let room = geometry::gltf::load("assets/cornell-box.gltf".as_ref())?;
+//! let world = geometry::World::new(room.scene);
+//! let solution = radiosity::solve(&world, &radiosity::Config::for_error(0.02), &())?;
+//! assert!(solution.report.convergence.converged);
+//! // Indirect light on the first triangle, a third of the way along two of its edges.
+//! println!("{:?} lx", solution.irradiance(&world, 0, 0.33, 0.33, Side::Front));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod caustic;
 pub mod element;

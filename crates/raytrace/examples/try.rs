@@ -15,7 +15,7 @@ impl Progress for P {
 }
 fn main() {
     let a: Vec<String> = std::env::args().collect();
-    let l = geometry::gltf::load(std::path::Path::new(&a[1])).unwrap();
+    let l = gltf::load(std::path::Path::new(&a[1])).unwrap();
     for w in &l.warnings {
         eprintln!("W {w}")
     }

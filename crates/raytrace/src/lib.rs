@@ -1,4 +1,30 @@
-//! What the eye sees: film, files and the measure of a picture's error.
+//! What the eye sees: a solved world becomes a picture, a file, and a measure of the picture's error.
+//!
+//! [`render()`] makes a [`Film`] by one of two [`integrator`]s: the two-pass method, which takes the light between diffuse
+//! surfaces from a [`radiosity::Solution`], and a path tracer, the reference, which never sees one. [`exr`] writes the
+//! film with its layers, [`tonemap`] a picture for a screen, and [`metrics`] compares two pictures.
+//!
+//! ```no_run
+//! use raytrace::{DiffuseMode, Integrator, Settings, exr, render};
+//!
+//! let room = geometry::gltf::load("assets/cornell-box.gltf".as_ref())?;
+//! let world = geometry::World::new(room.scene);
+//! let settings = Settings {
+//!     width: 512,
+//!     height: 512,
+//!     seed: 1,
+//!     error: 0.02,
+//!     integrator: Integrator::Hybrid,
+//!     diffuse: DiffuseMode::Split,
+//!     deadline: None,
+//!     gather_rays: None,
+//!     samples: None,
+//! };
+//! // Without a solution it makes its own; for many views, pass that of `prepass`.
+//! let outcome = render(&world, &room.cameras[0], None, &settings, &())?;
+//! exr::write(&outcome.film, &exr::Metadata::default(), "cornell.exr".as_ref())?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod difference;
 pub mod direct;
