@@ -160,32 +160,44 @@ impl<'a> Refiner<'a> {
         members: Vec<Member>,
         room: usize,
     ) -> (Vec<(VertexId, VertexId)>, Vec<(VertexId, VertexId)>, Vec<Member>) {
-        // Two ends that agree may still hide a bend between them: as much as this difference.
+        // Two ends that agree may still hide a bend between them: a tenth of what is there, and of what is elsewhere. So
+        // a panel whose corners lie dark behind a frame is looked at too.
         const HIDDEN: f32 = 0.1;
         let values = self.field.spread(&self.e);
         let floor = 0.1 * mean(&self.e).mean();
+        let everywhere = mean(&self.e).mean();
+        let promise = |difference: f32, level: f32| {
+            (difference + HIDDEN * (level + everywhere)) / (level + floor).max(1e-30)
+        };
         let change = |a: VertexId, b: VertexId| {
             let of = |side: Side| {
                 let (sa, sb) = (slot(a, side), slot(b, side));
                 match (self.field.usable(sa), self.field.usable(sb)) {
                     (true, true) => {
                         let (va, vb) = (values[sa], values[sb]);
-                        (va - vb).map(f32::abs).mean() / (0.5 * (va + vb).mean() + floor).max(1e-30)
+                        promise((va - vb).map(f32::abs).mean(), 0.5 * (va + vb).mean())
                     }
-                    (false, false) => 0.0,
+                    // A buried end says nothing of the rest.
                     _ => 1.0,
                 }
             };
-            of(Side::Front).max(of(Side::Back))
+            let piece = self.elements.vertices[a as usize].piece;
+            let lit = |side: &&Side| self.reach.alive(piece, **side);
+            Side::BOTH.iter().filter(lit).map(|&side| of(side)).fold(0.0, f32::max)
+        };
+        let around = |v: VertexId| {
+            let of = |&side: &Side| {
+                let s = slot(v, side);
+                promise(self.field.spread_around(s, &self.e), values[s].mean())
+            };
+            Side::BOTH.iter().filter(|&&side| self.field.usable(slot(v, side))).map(of).fold(0.0, f32::max)
         };
         let position = |v: VertexId| self.elements.vertices[v as usize].position;
-        let score = |change: f32, length: f32| (change + HIDDEN) * length / self.h0;
+        let score = |promise: f32, length: f32| promise * length / self.h0;
         let mut all: Vec<(f32, usize)> = edges
             .par_iter()
             .map(|&(a, b)| score(change(a, b), position(a).distance(position(b))))
-            .chain(
-                members.par_iter().map(|&(_, v, length)| score(self.owner_change(v, &values, floor), length)),
-            )
+            .chain(members.par_iter().map(|&(_, v, length)| score(around(v), length)))
             .enumerate()
             .map(|(i, s)| (s, i))
             .filter(|&(s, _)| s > self.config.tolerance)
@@ -199,17 +211,6 @@ impl<'a> Refiner<'a> {
             kept.iter().filter_map(edge).collect(),
             all.iter().filter_map(member).collect(),
         )
-    }
-
-    /// How much the sites around `v` differ among themselves, relatively: what its own gather may bring.
-    fn owner_change(&self, v: VertexId, values: &[Rgb], floor: f32) -> f32 {
-        Side::BOTH
-            .iter()
-            .map(|&side| {
-                let s = slot(v, side);
-                self.field.spread_around(s, &self.e) / (values[s].mean() + floor).max(1e-30)
-            })
-            .fold(0.0, f32::max)
     }
 
     /// Relative difference of what was gathered from what was predicted, the worse side.

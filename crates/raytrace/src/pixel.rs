@@ -201,7 +201,7 @@ fn one_surface(
     let wo = -ray.direction;
     // A sliver of a pixel needs fewer shadow rays for the same noise in the pixel.
     let shadow = if part < 0.3 && effort.shadow > 4 { effort.shadow / 4 } else { effort.shadow };
-    let quality = Quality { shadow, primary: true };
+    let quality = Quality { shadow, gather: true, photons: true };
     let (lit, plan) = hybrid.diffuse(surface, wo, quality, phase, rng);
     let albedo = surface.bsdf.diffuse_albedo(wo);
     let textured = varies(hybrid.world, surface.material);

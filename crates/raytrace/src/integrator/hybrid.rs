@@ -31,9 +31,10 @@ const FAINT: f32 = 0.12;
 pub struct Quality {
     /// Shadow rays: see [`Spend`].
     pub shadow: u32,
-    /// Whether the eye sees the surface directly: then it gathers where the mode or an unresolved mesh asks for it, and
-    /// photons are looked up one by one.
-    pub primary: bool,
+    /// Whether to gather at the surface where the mode or an unresolved mesh asks for it: for what the eye sees directly.
+    pub gather: bool,
+    /// Whether to look caustics up photon by photon: for what it sees directly or in a mirror.
+    pub photons: bool,
 }
 
 /// Shades surfaces of one world with one solution.
@@ -112,8 +113,8 @@ impl Hybrid<'_> {
         }
         let gathers = match self.mode {
             DiffuseMode::Vertex => false,
-            DiffuseMode::Split => quality.primary && self.solution.unresolved(t, u, v, side),
-            DiffuseMode::Gather => quality.primary,
+            DiffuseMode::Split => quality.gather && self.solution.unresolved(t, u, v, side),
+            DiffuseMode::Gather => quality.gather,
         };
         let mut e = self.solution.irradiance(self.world, t, u, v, side);
         if gathers {
@@ -130,7 +131,7 @@ impl Hybrid<'_> {
             out.gather_variance = trust * trust * variance * seen * seen;
         }
         // Only what the eye sees directly, or nearly so, needs a caustic's own sharpness.
-        e += if from_vertices || !quality.primary {
+        e += if from_vertices || !quality.photons {
             self.solution.caustic(self.world, t, u, v, side)
         } else {
             self.solution.caustics.irradiance(surface.position, surface.ng)
@@ -279,7 +280,7 @@ impl Hybrid<'_> {
         let shadow = if weight > 0.25 { 4 } else { 1 };
         let phase = (rng.f32() * 16.0) as u32;
         let (diffuse, plan) =
-            self.diffuse(surface, wo, Quality { shadow, primary: weight > 0.5 }, phase, rng);
+            self.diffuse(surface, wo, Quality { shadow, gather: false, photons: weight > 0.5 }, phase, rng);
         diffuse.direct
             + diffuse.indirect
             + diffuse.glossy
