@@ -143,7 +143,7 @@ fn near(world: &World, vertices: &[Vertex], grid: &Grid, site_of: &[u32], v: Ver
 fn sees(world: &World, a: &Vertex, b: &Vertex, side: Side) -> bool {
     let lift =
         |v: &Vertex, d: f32| offset_origin(v.position, v.normal * side.sign()) + v.normal * (side.sign() * d);
-    let d = (0.3 * a.position.distance(b.position)).max(1e-4 * world.diagonal);
+    let d = (0.3 * a.position.distance(b.position)).max(1e-4 * world.scale);
     let (from, to) = (lift(a, d), lift(b, d));
     let length = from.distance(to);
     if length <= 0.0 {

@@ -6,7 +6,7 @@ use geometry::{Ray, Vec3, World, triangle};
 
 /// Something stands across the leaf: its corners may not see each other.
 const PIERCED: u8 = 1;
-/// The light on it bends more sharply than the mesh can follow.
+/// The light on it bends more sharply than the mesh can follow, or a corner of it is buried.
 const UNRESOLVED: u8 = 2;
 
 /// For each node and side, what is wrong with it.
@@ -42,7 +42,7 @@ impl Flags {
         self.bits.is_empty()
     }
 
-    /// Whether the light on it bends more sharply than the mesh can follow.
+    /// Whether the mesh does not tell the light on it: it bends too sharply, or a corner is buried.
     pub fn unresolved(&self, node: u32, side: Side) -> bool {
         self.get(node, side) & UNRESOLVED != 0
     }
@@ -82,7 +82,7 @@ pub(crate) fn visible_weights(
     }
     let places = elements.corners(node);
     let normal = triangle::normal(places[0], places[1], places[2]) * side.sign();
-    let lift = |p: Vec3| offset_origin(p, normal) + normal * (1e-4 * world.diagonal);
+    let lift = |p: Vec3| offset_origin(p, normal) + normal * (1e-4 * world.scale);
     let at = lift(places[0] * w[0] + places[1] * w[1] + places[2] * w[2]);
     let middle = (places[0] + places[1] + places[2]) / 3.0;
     let seen = std::array::from_fn(|i| {

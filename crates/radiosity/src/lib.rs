@@ -25,12 +25,14 @@
 //! ```
 
 pub mod caustic;
+mod clusters;
 pub mod element;
 pub mod field;
 pub mod flags;
 pub mod gather;
 pub mod reach;
 pub mod refine;
+mod sites;
 pub mod solution;
 pub mod solver;
 pub mod transport;

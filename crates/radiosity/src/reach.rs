@@ -1,22 +1,25 @@
 //! Which sides of which pieces of surface light can reach at all.
 //!
 //! Both sides of a surface reflect, so each has an irradiance of its own; but the outside of a windowless room and
-//! the inside of a box are dark for ever. Rays from either side of every piece tell whether it sees an emitter, and
-//! which other sides it sees; what sees a lit side is lit. So the two sides are told apart whichever way the triangles
-//! face. A dead side needs no gathering, and a vertex that sees mostly dead sides is buried inside something.
+//! the inside of a box are dark for ever. Random walks from either side of every piece tell them apart, whichever way
+//! the triangles face: a side from which hardly any walk comes to a lit place is dead. It needs no gathering, and a
+//! vertex that sees mostly dead sides is buried inside something.
 
 use crate::element::{Elements, Side};
 use geometry::math::{offset_origin, to_world};
 use geometry::sampling::{self, Rng};
-use geometry::{Hit, Mesh, Ray, Surface, Vec3, World};
+use geometry::{Mesh, Ray, Surface, Vec3, World};
 use rayon::prelude::*;
 
-/// Rays from each side of every piece, at least.
-const RAYS: usize = 64;
-/// Rays shared among all sides by area beside those.
-const SHARED: usize = 200_000;
-/// Mirrors and panes that a ray passes at most.
-const LONGEST: usize = 16;
+/// Walks from each side of every piece, at most.
+const WALKS: usize = 48;
+/// Walks shared among all sides by area beside those.
+const SHARED: usize = 60_000;
+/// Surfaces that a walk meets at most.
+const LONGEST: usize = 10;
+/// A side is lit when one walk in so many comes to a lit place: fewer come through the cracks between a room's walls
+/// (0.65 % outside the measured Cornell box).
+const RARE: usize = 300;
 
 /// Which sides light reaches.
 #[derive(Clone, Debug)]
@@ -25,43 +28,17 @@ pub struct Reach {
     alive: Vec<[bool; 2]>,
 }
 
-/// What the rays of one side found.
-#[derive(Default)]
-struct Found {
-    lit: bool,
-    /// Sides seen, as 2 · piece + side.
-    seen: Vec<u32>,
-}
-
 impl Reach {
     /// Whether light can come to `side` of the piece numbered `piece`.
     pub fn alive(&self, piece: u32, side: Side) -> bool {
         self.alive[piece as usize][side.index()]
     }
 
-    /// Sends rays from every side and follows what they see back to the emitters.
+    /// Walks from every side and looks whether it comes to a lit place.
     pub fn explore(world: &World, elements: &Elements, seed: u64) -> Reach {
-        let pieces = elements.pieces as usize;
         let areas = Areas::new(&world.scene.mesh, elements);
-        let found: Vec<Found> = (0..2 * pieces)
-            .into_par_iter()
-            .map(|s| look_around(world, elements, &areas, s / 2, Side::BOTH[s % 2], seed))
-            .collect();
-        let mut seen_by: Vec<Vec<u32>> = vec![Vec::new(); 2 * pieces];
-        for (s, f) in found.iter().enumerate() {
-            for &other in &f.seen {
-                seen_by[other as usize].push(s as u32);
-            }
-        }
-        let mut alive = vec![[false; 2]; pieces];
-        let mut open: Vec<u32> = (0..2 * pieces as u32).filter(|&s| found[s as usize].lit).collect();
-        while let Some(s) = open.pop() {
-            let lit = &mut alive[s as usize / 2][s as usize % 2];
-            if !std::mem::replace(lit, true) {
-                open.extend(&seen_by[s as usize]);
-            }
-        }
-        Reach { alive }
+        let lit = |piece: usize| Side::BOTH.map(|side| is_lit(world, &areas, piece, side, seed));
+        Reach { alive: (0..elements.pieces as usize).into_par_iter().map(lit).collect() }
     }
 }
 
@@ -101,55 +78,55 @@ impl Areas {
     }
 }
 
-/// Rays from random points on one side of a piece.
-fn look_around(
-    world: &World,
-    elements: &Elements,
-    areas: &Areas,
-    piece: usize,
-    side: Side,
-    seed: u64,
-) -> Found {
-    let mut found = Found::default();
-    let rays = RAYS + (SHARED as f32 * areas.piece(piece) / (2.0 * areas.total).max(1e-30)) as usize;
+/// Whether enough walks from random points on one side of a piece come to a lit place.
+fn is_lit(world: &World, areas: &Areas, piece: usize, side: Side, seed: u64) -> bool {
+    let walks = WALKS + (SHARED as f32 * areas.piece(piece) / (2.0 * areas.total).max(1e-30)) as usize;
+    let enough = walks.div_ceil(RARE);
     let mut rng = Rng::new(seed ^ 0x72_6561_6368, (2 * piece + side.index()) as u64);
-    for _ in 0..rays {
-        let Some((p, n)) = areas.point(&world.scene.mesh, piece, &mut rng) else { return found };
-        let n = n * side.sign();
-        let u = rng.array();
-        if let Some(light) = world.emitters.sample(&world.scene, p, n, u).filter(|l| l.wi.dot(n) > 0.0) {
-            found.lit |=
-                !light.radiance.is_black() && !world.transmittance(&light.shadow_ray(p, n)).is_black();
+    let mut lit = 0;
+    for _ in 0..walks {
+        let Some((p, n)) = areas.point(&world.scene.mesh, piece, &mut rng) else { return false };
+        lit += usize::from(walk(world, p, n * side.sign(), &mut rng));
+        if lit >= enough {
+            return true;
         }
-        let wi = to_world(sampling::cosine_hemisphere(rng.vec2()), n);
-        look(world, elements, Ray::new(offset_origin(p, n), wi), &mut rng, &mut found);
     }
-    found.seen.sort_unstable();
-    found.seen.dedup();
-    found
+    false
 }
 
-/// One ray: the sides it meets, through panes and mirrors, and whether it ends in a light.
-fn look(world: &World, elements: &Elements, mut ray: Ray, rng: &mut Rng, found: &mut Found) {
+/// Whether a walk from `p`, on a side of unit normal `n`, comes to a place that an emitter shines on, or to an emitter.
+fn walk(world: &World, p: Vec3, n: Vec3, rng: &mut Rng) -> bool {
+    if shone_on(world, p, n, rng) {
+        return true;
+    }
+    let mut ray = Ray::new(offset_origin(p, n), to_world(sampling::cosine_hemisphere(rng.vec2()), n));
     for _ in 0..LONGEST {
-        let Some(hit): Option<Hit> = world.bvh.closest_hit(&ray) else {
-            found.lit |= world.scene.sky.is_some();
-            return;
-        };
+        let Some(hit) = world.bvh.closest_hit(&ray) else { return world.scene.sky.is_some() };
         let surface = Surface::new(&world.scene, &ray, &hit);
-        found.lit |= !surface.emission.is_black();
+        if !surface.emission.is_black() {
+            return true;
+        }
         let on = if rng.f32() >= surface.coverage {
             ray.direction
+        } else if surface.bsdf.has_diffuse() && shone_on(world, surface.position, surface.ng, rng) {
+            return true;
         } else {
-            if let Some(piece) = elements.piece(hit.triangle) {
-                found.seen.push(2 * piece + Side::met(surface.front).index() as u32);
-            }
-            match surface.bsdf.sample_specular(-ray.direction, rng.array()) {
+            match surface.bsdf.sample(-ray.direction, rng.array()) {
                 Some(next) => next.wi,
-                None => return,
+                None => return false,
             }
         };
         let away = if on.dot(surface.ng) > 0.0 { surface.ng } else { -surface.ng };
         ray = Ray::new(offset_origin(surface.position, away), on);
     }
+    false
+}
+
+/// Whether one light sample reaches `p` on the side of unit normal `n`.
+fn shone_on(world: &World, p: Vec3, n: Vec3, rng: &mut Rng) -> bool {
+    world.emitters.sample(&world.scene, p, n, rng.array()).is_some_and(|light| {
+        light.wi.dot(n) > 0.0
+            && !light.radiance.is_black()
+            && !world.transmittance(&light.shadow_ray(p, n)).is_black()
+    })
 }

@@ -3,35 +3,36 @@
 //! Two kinds of vertices are tested alike. The midpoint of a long edge is new; in finely tessellated surface, where
 //! one site speaks for many vertices, the one furthest from its site is. A tested vertex stays a site in either case.
 
-use crate::element::cluster::{self, distance2};
+use crate::clusters::{Clusters, Member};
+use crate::element::cluster;
 use crate::element::{EdgeMarks, Elements, Side, VertexId, slot};
-use crate::field::{Field, Site};
+use crate::field::Field;
 use crate::flags::{Flags, visible_weights};
-use crate::gather::{self, Origin};
 use crate::reach::Reach;
 use crate::solve::{Config, Progress};
 use crate::solver::{self, Convergence, Gain};
-use crate::transport::{Landing, Row, Transport};
+use crate::transport::{Landing, Transport};
 use geometry::math::offset_origin;
 use geometry::sampling::Lattice2;
 use geometry::{Ray, Rgb, World, triangle};
 use rayon::prelude::*;
-use std::collections::HashMap;
 
 /// A midpoint this far (relative) from its prediction, at the finest mesh, marks its surroundings for a gather of
 /// their own in pass 2.
 const ROUGH: f32 = 0.15;
-/// Origins that one vertex's rays are shared among, at most.
-const FACETS: usize = 16;
+/// Elements (of h0² each) that the first mesh may have, about.
+const FIRST_ELEMENTS: f32 = 10_000.0;
+/// Rays that probe the middle of a leaf.
+const PROBE: u32 = 128;
 /// A gather ray starts this share of the way from its vertex into a facet: a vertex in the corner of a room lies on
 /// the walls, and a ray from there may start on the wrong side of one.
-const INWARD: f32 = 0.02;
+pub(crate) const INWARD: f32 = 0.02;
 
 /// The element mesh with everything gathered on it.
 pub(crate) struct Refiner<'a> {
-    world: &'a World,
-    config: &'a Config,
-    progress: &'a dyn Progress,
+    pub(crate) world: &'a World,
+    pub(crate) config: &'a Config,
+    pub(crate) progress: &'a dyn Progress,
     pub(crate) elements: Elements,
     pub(crate) reach: Reach,
     pub(crate) field: Field,
@@ -44,9 +45,9 @@ pub(crate) struct Refiner<'a> {
     /// Longest edge of the first mesh, m.
     h0: f32,
     /// Shortest edge worth splitting to, m.
-    h_min: f32,
+    pub(crate) h_min: f32,
     /// Reach of a site in finely tessellated surface, m.
-    radius: f32,
+    pub(crate) radius: f32,
 }
 
 /// A vertex gathered to be compared with a prediction.
@@ -63,11 +64,13 @@ struct Test {
 impl<'a> Refiner<'a> {
     /// The first mesh: no edge longer than h0, sites where clusters of vertices need them, all gathered.
     pub(crate) fn start(world: &'a World, config: &'a Config, progress: &'a dyn Progress) -> Refiner<'a> {
-        let scale = world.diagonal;
+        let scale = world.scale;
         let (h0, h_min, radius) = (config.h0 * scale, config.h_min * scale, config.cluster_radius * scale);
         let mut elements = Elements::new(&world.scene.mesh);
         let most = config.most_vertices.max(2 * elements.vertices.len());
-        elements.split_longer_than(h0, most);
+        // A landscape outside may not eat up the first mesh: its elements stay coarse.
+        let area: f32 = (0..world.scene.mesh.triangles.len() as u32).map(|t| world.scene.mesh.area(t)).sum();
+        elements.split_longer_than(h0.max((area / FIRST_ELEMENTS).sqrt()), most);
         let reach = Reach::explore(world, &elements, config.seed);
         let mut diffuse = vec![false; elements.pieces as usize];
         for (t, material) in world.scene.mesh.materials.iter().enumerate() {
@@ -107,10 +110,14 @@ impl<'a> Refiner<'a> {
         let mut open: Vec<usize> = (0..clusters.members.len()).collect();
         // Vertices far from their prediction around which nothing finer was tested.
         let mut rough = vec![false; self.elements.vertices.len()];
+        let mut probed = 0;
         for round in 0..self.config.rounds {
             if self.progress.stopped() {
                 break;
             }
+            edges.extend(self.surprising(&mut probed));
+            edges.sort_unstable();
+            edges.dedup();
             let left = self.config.most_sites.saturating_sub(self.field.sites.len());
             // The first rounds may not use up what later ones need to go deep.
             let room = if round + 1 < self.config.rounds { left / 2 } else { left };
@@ -136,7 +143,7 @@ impl<'a> Refiner<'a> {
             rough.resize(self.elements.vertices.len(), false);
             let mut failed = vec![false; self.elements.vertices.len()];
             for (test, &error) in tests.iter().zip(&errors) {
-                let weighed = error * test.length / self.h0;
+                let weighed = error * (test.length / self.h0).min(1.0);
                 // What stands on an edge is worth a quarter of the tolerance: the light may be even all the same.
                 failed[test.vertex as usize] =
                     weighed > self.config.tolerance * if test.parted { 0.25 } else { 1.0 };
@@ -149,6 +156,33 @@ impl<'a> Refiner<'a> {
             open = clusters.divide(self, &members, &failed);
         }
         self.unresolved = (0..rough.len() as VertexId).filter(|&v| rough[v as usize]).collect();
+    }
+
+    /// Edges of the leaves, from number `probed` on, whose middle is lit quite otherwise than their corners say.
+    fn surprising(&self, probed: &mut u32) -> Vec<(VertexId, VertexId)> {
+        let values = self.field.spread(&self.e);
+        let floor = 0.2 * mean(&self.e).mean();
+        let pattern = Lattice2::new(PROBE);
+        let large = |&leaf: &u32| {
+            let [a, b, c] = self.elements.corners(leaf);
+            let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+            leaf >= *probed && longest > self.radius && self.diffuse[self.elements.piece_of(leaf)]
+        };
+        let leaves: Vec<u32> = self.elements.leaves().filter(large).collect();
+        *probed = self.elements.nodes.len() as u32;
+        let surprising =
+            leaves.into_par_iter().filter(|&leaf| self.surprises(leaf, &values, floor, &pattern));
+        let edges = surprising.flat_map_iter(|leaf| {
+            let v = self.elements.nodes[leaf as usize].vertices;
+            (0..3).map(move |e| (v[e].min(v[(e + 1) % 3]), v[e].max(v[(e + 1) % 3])))
+        });
+        let all: Vec<_> = edges.collect();
+        all.into_iter().filter(|&(a, b)| self.length(a, b) > 2.0 * self.h_min).collect()
+    }
+
+    /// Distance of two vertices, m.
+    fn length(&self, a: VertexId, b: VertexId) -> f32 {
+        self.elements.vertices[a as usize].position.distance(self.elements.vertices[b as usize].position)
     }
 
     /// Of the edges and the clusters' furthest members, at most `room` that promise most: those along which E changes,
@@ -166,8 +200,10 @@ impl<'a> Refiner<'a> {
         let values = self.field.spread(&self.e);
         let floor = 0.1 * mean(&self.e).mean();
         let everywhere = mean(&self.e).mean();
-        let promise = |difference: f32, level: f32| {
-            (difference + HIDDEN * (level + everywhere)) / (level + floor).max(1e-30)
+        let promise = |difference: f32, level: f32| match level + everywhere {
+            // Without indirect light there is still the direct one, for those who take it from the vertices.
+            0.0 => HIDDEN,
+            around => (difference + HIDDEN * around) / (level + floor),
         };
         let change = |a: VertexId, b: VertexId| {
             let of = |side: Side| {
@@ -192,11 +228,10 @@ impl<'a> Refiner<'a> {
             };
             Side::BOTH.iter().filter(|&&side| self.field.usable(slot(v, side))).map(of).fold(0.0, f32::max)
         };
-        let position = |v: VertexId| self.elements.vertices[v as usize].position;
-        let score = |promise: f32, length: f32| promise * length / self.h0;
+        let score = |promise: f32, length: f32| promise * (length / self.h0).min(1.0);
         let mut all: Vec<(f32, usize)> = edges
             .par_iter()
-            .map(|&(a, b)| score(change(a, b), position(a).distance(position(b))))
+            .map(|&(a, b)| score(change(a, b), self.length(a, b)))
             .chain(members.par_iter().map(|&(_, v, length)| score(around(v), length)))
             .enumerate()
             .map(|(i, s)| (s, i))
@@ -251,9 +286,7 @@ impl<'a> Refiner<'a> {
         let test = |&(a, b, m): &(VertexId, VertexId, VertexId)| Test {
             vertex: m,
             from: vec![(a, 0.5), (b, 0.5)],
-            length: self.elements.vertices[a as usize]
-                .position
-                .distance(self.elements.vertices[b as usize].position),
+            length: self.length(a, b),
             parted: self.parted(a, b),
         };
         midpoints.par_iter().map(test).collect()
@@ -263,7 +296,7 @@ impl<'a> Refiner<'a> {
     fn parted(&self, a: VertexId, b: VertexId) -> bool {
         let (a, b) = (&self.elements.vertices[a as usize], &self.elements.vertices[b as usize]);
         Side::BOTH.iter().filter(|&&side| self.reach.alive(a.piece, side)).any(|&side| {
-            let lift = 1e-4 * self.world.diagonal * side.sign();
+            let lift = 1e-4 * self.world.scale * side.sign();
             let (from, to) = (a.position + a.normal * lift, b.position + b.normal * lift);
             let length = from.distance(to);
             // The ends often lie in a wall's plane: leave them out.
@@ -274,7 +307,7 @@ impl<'a> Refiner<'a> {
     }
 
     /// Which vertices a leaf that reflects diffusely uses.
-    fn used(&self) -> Vec<bool> {
+    pub(crate) fn used(&self) -> Vec<bool> {
         let mut used = vec![false; self.elements.vertices.len()];
         for leaf in self.elements.leaves().filter(|&leaf| self.diffuse[self.elements.piece_of(leaf)]) {
             for v in self.elements.nodes[leaf as usize].vertices {
@@ -305,88 +338,6 @@ impl<'a> Refiner<'a> {
         edges.sort_unstable();
         edges.dedup();
         edges
-    }
-
-    /// Gathers at both sides, as far as light reaches them, of `vertices`; connects the field anew.
-    fn gather(&mut self, vertices: &[VertexId]) {
-        let origins = self.origins(vertices);
-        let jobs: Vec<(VertexId, Side)> = vertices
-            .iter()
-            .flat_map(|&v| Side::BOTH.map(|side| (v, side)))
-            .filter(|&(v, side)| self.reach.alive(self.elements.vertices[v as usize].piece, side))
-            .filter(|(v, _)| origins.contains_key(v))
-            .collect();
-        let mut rays = self.config.rays;
-        let mut rows = self.gather_rows(&jobs, &origins, rays);
-        // Where few rays find the light (a sunny patch, a lamp behind a shade) it takes more of them.
-        for _ in 0..2 {
-            rays *= 4;
-            let all = self.field.sites.iter().map(|s| &s.row).chain(&rows).map(|r| r.direct);
-            let floor = 0.1 * mean(&all.collect::<Vec<_>>()).mean();
-            let noisy = |r: &Row| r.variance.sqrt() > self.config.noise * (r.direct.mean() + floor);
-            let which: Vec<usize> = (0..rows.len()).filter(|&i| noisy(&rows[i])).collect();
-            if which.is_empty() || self.progress.stopped() {
-                break;
-            }
-            let again: Vec<(VertexId, Side)> = which.iter().map(|&i| jobs[i]).collect();
-            for (i, row) in which.into_iter().zip(self.gather_rows(&again, &origins, rays)) {
-                rows[i] = row;
-            }
-        }
-        self.e.extend(rows.iter().map(|row| row.direct));
-        let sites = jobs.into_iter().zip(rows).map(|((vertex, side), row)| Site { vertex, side, row });
-        self.field.sites.extend(sites);
-        self.field.connect(self.world, &self.elements, self.radius);
-    }
-
-    /// Rows of `rays` rays each, fewer where landings would take more memory than they may.
-    fn gather_rows(
-        &self,
-        jobs: &[(VertexId, Side)],
-        origins: &HashMap<VertexId, Vec<Origin>>,
-        rays: u32,
-    ) -> Vec<Row> {
-        let held: usize = self.field.sites.iter().map(|s| s.row.landings.len()).sum();
-        let room = self.config.most_landings.saturating_sub(held) / jobs.len().max(1);
-        let pattern = Lattice2::new(rays.min(room as u32).max(16));
-        self.progress.stage("gathering", jobs.len() as u64);
-        let dead =
-            |t: u32, side: Side| self.elements.piece(t).is_none_or(|piece| !self.reach.alive(piece, side));
-        jobs.par_iter()
-            .map(|&(vertex, side)| {
-                let turned = turned(&origins[&vertex], side);
-                let normal = self.elements.vertices[vertex as usize].normal * side.sign();
-                // Another number of rays draws other numbers: a row that is done again shares nothing with the first.
-                let stream = (u64::from(rays) << 40) ^ slot(vertex, side) as u64;
-                let row = gather::row(self.world, &turned, normal, &pattern, self.config.seed, stream, dead);
-                self.progress.advance(1);
-                row
-            })
-            .collect()
-    }
-
-    /// For each of `vertices`, points just inside the facets around it.
-    fn origins(&self, vertices: &[VertexId]) -> HashMap<VertexId, Vec<Origin>> {
-        let mut wanted = vec![false; self.elements.vertices.len()];
-        for &v in vertices {
-            wanted[v as usize] = true;
-        }
-        let mut origins: HashMap<VertexId, Vec<Origin>> = HashMap::new();
-        for leaf in self.elements.leaves() {
-            let corners = self.elements.corners(leaf);
-            for (k, v) in self.elements.nodes[leaf as usize].vertices.into_iter().enumerate() {
-                if !wanted[v as usize] {
-                    continue;
-                }
-                let around = origins.entry(v).or_default();
-                if around.len() < FACETS {
-                    let [a, b, c] = [corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]];
-                    let position = a + ((b - a) + (c - a)) * INWARD;
-                    around.push(Origin { position, ng: triangle::normal(a, b, c) });
-                }
-            }
-        }
-        origins
     }
 
     /// Solves on what there is, roughly: for predictions, not for pictures.
@@ -429,7 +380,9 @@ impl<'a> Refiner<'a> {
             if !self.reach.alive(self.elements.vertices[corners[0] as usize].piece, side) {
                 return (false, false);
             }
-            let coarse = corners.iter().any(|&v| unresolved[v as usize]);
+            let usable = corners.map(|v| self.field.usable(slot(v, side)));
+            let half_buried = usable.contains(&true) && usable.contains(&false);
+            let coarse = half_buried || corners.iter().any(|&v| unresolved[v as usize]);
             (self.pierced(n, side), coarse)
         })
     }
@@ -440,39 +393,13 @@ impl<'a> Refiner<'a> {
         let normal = triangle::normal(corners[0], corners[1], corners[2]) * side.sign();
         let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
         let inside = corners
-            .map(|p| offset_origin(p.lerp(middle, INWARD), normal) + normal * (1e-4 * self.world.diagonal));
+            .map(|p| offset_origin(p.lerp(middle, INWARD), normal) + normal * (1e-4 * self.world.scale));
         (0..3).any(|e| {
             let (from, to) = (inside[e], inside[(e + 1) % 3]);
             let length = from.distance(to);
             length > self.h_min
                 && self.world.bvh.occluded(&Ray { t_max: length, ..Ray::new(from, (to - from) / length) })
         })
-    }
-
-    /// Direct irradiance at every slot, lx: `samples` light samples at each site.
-    pub(crate) fn direct(&self, samples: u32) -> Vec<Rgb> {
-        let vertices: Vec<VertexId> = self.field.sites.iter().map(|s| s.vertex).collect();
-        let origins = self.origins(&vertices);
-        let at_sites: Vec<Rgb> = self
-            .field
-            .sites
-            .par_iter()
-            .map(|site| {
-                let v = &self.elements.vertices[site.vertex as usize];
-                let Some(origins) = origins.get(&site.vertex) else { return Rgb::BLACK };
-                let turned = turned(origins, site.side);
-                let stream = slot(site.vertex, site.side) as u64;
-                gather::direct(
-                    self.world,
-                    &turned,
-                    v.normal * site.side.sign(),
-                    samples,
-                    self.config.seed,
-                    stream,
-                )
-            })
-            .collect();
-        self.field.spread(&at_sites)
     }
 
     /// Reflected shares that landed in all, for the report.
@@ -486,97 +413,10 @@ impl<'a> Refiner<'a> {
     }
 }
 
-/// The origins seen from `side`.
-fn turned(origins: &[Origin], side: Side) -> Vec<Origin> {
-    origins.iter().map(|o| Origin { ng: o.ng * side.sign(), ..*o }).collect()
-}
-
 /// Mean over sites, lx.
 pub(crate) fn mean(e: &[Rgb]) -> Rgb {
     let sum = e
         .iter()
         .fold([0f64; 3], |s, e| [s[0] + f64::from(e.r), s[1] + f64::from(e.g), s[2] + f64::from(e.b)]);
     Rgb::from(sum.map(|s| (s / e.len().max(1) as f64) as f32))
-}
-
-/// A cluster, its member furthest from the site, and the length of surface that the site stands for, m.
-type Member = (usize, VertexId, f32);
-
-/// Vertices without a site of their own, by the site that speaks for them.
-struct Clusters {
-    /// The vertex of the site, and those that it speaks for.
-    members: Vec<(VertexId, Vec<VertexId>)>,
-}
-
-impl Clusters {
-    fn new(refiner: &Refiner) -> Clusters {
-        let vertices = &refiner.elements.vertices;
-        let used = refiner.used();
-        let mut cluster_of = vec![usize::MAX; vertices.len()];
-        let mut members: Vec<(VertexId, Vec<VertexId>)> = Vec::new();
-        let mut grid = cluster::Grid::new(refiner.radius);
-        for site in &refiner.field.sites {
-            if cluster_of[site.vertex as usize] == usize::MAX {
-                cluster_of[site.vertex as usize] = members.len();
-                members.push((site.vertex, Vec::new()));
-                grid.insert(vertices, site.vertex);
-            }
-        }
-        let owners: Vec<Option<VertexId>> = (0..vertices.len())
-            .into_par_iter()
-            .map(|v| {
-                let open = used[v] && cluster_of[v] == usize::MAX;
-                open.then(|| {
-                    grid.near(vertices, &vertices[v]).min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)))
-                })
-                .flatten()
-                .map(|(owner, _)| owner)
-            })
-            .collect();
-        for (v, owner) in owners.into_iter().enumerate() {
-            if let Some(owner) = owner {
-                members[cluster_of[owner as usize]].1.push(v as VertexId);
-            }
-        }
-        Clusters { members }
-    }
-
-    /// From each of the clusters `which`, the member furthest from the site, unless it is too near to matter.
-    fn furthest(&self, refiner: &Refiner, which: &[usize]) -> Vec<Member> {
-        let vertices = &refiner.elements.vertices;
-        let least = 2.0 * refiner.h_min / refiner.radius;
-        which
-            .par_iter()
-            .filter_map(|&c| {
-                let (site, members) = &self.members[c];
-                let far = |&v: &VertexId| {
-                    (v, distance2(&vertices[v as usize], &vertices[*site as usize], refiner.radius))
-                };
-                let (v, d2) =
-                    members.iter().map(far).max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))?;
-                (d2.sqrt() > least).then_some((c, v, 2.0 * d2.sqrt() * refiner.radius))
-            })
-            .collect()
-    }
-
-    /// Gives every tested vertex a cluster of its own with the members nearer to it; returns the clusters whose test failed.
-    fn divide(&mut self, refiner: &Refiner, tested: &[Member], failed: &[bool]) -> Vec<usize> {
-        let vertices = &refiner.elements.vertices;
-        let mut open = Vec::new();
-        for &(c, t, _) in tested {
-            let site = self.members[c].0;
-            let all = std::mem::take(&mut self.members[c].1);
-            let from = |v: VertexId, w: VertexId| {
-                distance2(&vertices[v as usize], &vertices[w as usize], refiner.radius)
-            };
-            let (taken, kept): (Vec<_>, Vec<_>) =
-                all.into_iter().filter(|&v| v != t).partition(|&v| from(v, t) < from(v, site));
-            self.members[c].1 = kept;
-            self.members.push((t, taken));
-            if failed[t as usize] {
-                open.extend([c, self.members.len() - 1]);
-            }
-        }
-        open
-    }
 }

@@ -6,7 +6,7 @@ use crate::solution::{Report, Solution};
 use geometry::World;
 use thiserror::Error;
 
-/// What the prepass may cost and how exact it is to be. Lengths are in units of the scene's diagonal.
+/// What the prepass may cost and how exact it is to be. Lengths are in units of the size of its rooms, [`World::scale`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// Rays gathered at each site. Error of E measured in a Cornell box: 64 → 5.7 %, 256 → 1.9 %, 1024 → 0.67 %.

@@ -124,7 +124,8 @@ impl Hybrid<'_> {
             // shrinkage); in `gather` it stands for itself.
             let trust = match self.mode {
                 DiffuseMode::Gather => 1.0,
-                _ => (1.0 - variance / difference.luminance().powi(2).max(1e-30)).max(0.0),
+                // Four times, so that a single lucky ray, whose own spread is its only witness, is not believed.
+                _ => (1.0 - 4.0 * variance / difference.luminance().powi(2).max(1e-30)).max(0.0),
             };
             e += difference * trust;
             let seen = photometry::reflected_radiance(albedo, Rgb::WHITE).luminance();

@@ -1,0 +1,171 @@
+//! Gathering at the vertices of the element mesh: where the rays start, and how many they are.
+
+use crate::element::{Side, VertexId, slot};
+use crate::field::Site;
+use crate::gather::{self, Origin};
+use crate::refine::{INWARD, Refiner, mean};
+use crate::transport::Row;
+use geometry::sampling::Lattice2;
+use geometry::{Rgb, triangle};
+use rayon::prelude::*;
+use std::collections::HashMap;
+
+/// Origins that one vertex's rays are shared among, at most.
+const FACETS: usize = 16;
+
+impl Refiner<'_> {
+    /// Gathers at both sides, as far as light reaches them, of `vertices`; connects the field anew.
+    pub(crate) fn gather(&mut self, vertices: &[VertexId]) {
+        let origins = self.origins(vertices);
+        let jobs: Vec<(VertexId, Side)> = vertices
+            .iter()
+            .flat_map(|&v| Side::BOTH.map(|side| (v, side)))
+            .filter(|&(v, side)| self.reach.alive(self.elements.vertices[v as usize].piece, side))
+            .filter(|(v, _)| origins.contains_key(v))
+            .collect();
+        let mut rays = self.config.rays;
+        let mut rows = self.gather_rows(&jobs, &origins, rays);
+        // Where few rays find the light (a sunny patch, a lamp behind a shade) it takes more of them.
+        for _ in 0..2 {
+            rays *= 4;
+            let all = self.field.sites.iter().map(|s| &s.row).chain(&rows).map(|r| r.direct);
+            let floor = 0.1 * mean(&all.collect::<Vec<_>>()).mean();
+            let noisy = |r: &Row| r.variance.sqrt() > self.config.noise * (r.direct.mean() + floor);
+            let which: Vec<usize> = (0..rows.len()).filter(|&i| noisy(&rows[i])).collect();
+            if which.is_empty() || self.progress.stopped() {
+                break;
+            }
+            let again: Vec<(VertexId, Side)> = which.iter().map(|&i| jobs[i]).collect();
+            for (i, row) in which.into_iter().zip(self.gather_rows(&again, &origins, rays)) {
+                rows[i] = row;
+            }
+        }
+        self.e.extend(rows.iter().map(|row| row.direct));
+        let sites = jobs.into_iter().zip(rows).map(|((vertex, side), row)| Site { vertex, side, row });
+        self.field.sites.extend(sites);
+        self.field.connect(self.world, &self.elements, self.radius);
+    }
+
+    /// Rows of `rays` rays each, fewer where landings would take more memory than they may.
+    fn gather_rows(
+        &self,
+        jobs: &[(VertexId, Side)],
+        origins: &HashMap<VertexId, Vec<Origin>>,
+        rays: u32,
+    ) -> Vec<Row> {
+        let held: usize = self.field.sites.iter().map(|s| s.row.landings.len()).sum();
+        let room = self.config.most_landings.saturating_sub(held) / jobs.len().max(1);
+        let pattern = Lattice2::new(rays.min(room as u32).max(16));
+        self.progress.stage("gathering", jobs.len() as u64);
+        let dead =
+            |t: u32, side: Side| self.elements.piece(t).is_none_or(|piece| !self.reach.alive(piece, side));
+        jobs.par_iter()
+            .map(|&(vertex, side)| {
+                let turned = turned(&origins[&vertex], side);
+                let normal = self.elements.vertices[vertex as usize].normal * side.sign();
+                // Another number of rays draws other numbers: a row that is done again shares nothing with the first.
+                let stream = (u64::from(rays) << 40) ^ slot(vertex, side) as u64;
+                let row = gather::row(self.world, &turned, normal, &pattern, self.config.seed, stream, dead);
+                self.progress.advance(1);
+                row
+            })
+            .collect()
+    }
+
+    /// For each of `vertices`, points just inside the facets around it.
+    fn origins(&self, vertices: &[VertexId]) -> HashMap<VertexId, Vec<Origin>> {
+        let mut wanted = vec![false; self.elements.vertices.len()];
+        for &v in vertices {
+            wanted[v as usize] = true;
+        }
+        let mut origins: HashMap<VertexId, Vec<Origin>> = HashMap::new();
+        for leaf in self.elements.leaves() {
+            let corners = self.elements.corners(leaf);
+            for (k, v) in self.elements.nodes[leaf as usize].vertices.into_iter().enumerate() {
+                if !wanted[v as usize] {
+                    continue;
+                }
+                let around = origins.entry(v).or_default();
+                if around.len() < FACETS {
+                    let [a, b, c] = [corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]];
+                    let position = a + ((b - a) + (c - a)) * INWARD;
+                    around.push(Origin { position, ng: triangle::normal(a, b, c) });
+                }
+            }
+        }
+        origins
+    }
+
+    /// Whether the middle of a leaf is lit quite otherwise than its corners say: a panel whose edges all lie behind a
+    /// frame looks dark to tests along its edges. A few rays, for coarse differences only.
+    pub(crate) fn surprises(&self, leaf: u32, values: &[Rgb], floor: f32, pattern: &Lattice2) -> bool {
+        let corners = self.elements.corners(leaf);
+        let vertices = self.elements.nodes[leaf as usize].vertices;
+        let ng = triangle::normal(corners[0], corners[1], corners[2]);
+        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let normals = vertices.map(|v| self.elements.vertices[v as usize].normal);
+        let smooth = (normals[0] + normals[1] + normals[2]).normalize_or(ng);
+        let dead =
+            |t: u32, side: Side| self.elements.piece(t).is_none_or(|piece| !self.reach.alive(piece, side));
+        Side::BOTH.iter().filter(|&&side| self.reach.alive(self.elements.piece_of(leaf) as u32, side)).any(
+            |&side| {
+                let origins = [Origin { position: middle, ng: ng * side.sign() }];
+                let stream = (1 << 62) | slot(leaf, side) as u64;
+                let normal = smooth * side.sign();
+                let row = gather::row(self.world, &origins, normal, pattern, self.config.seed, stream, dead);
+                if row.dead > 0.5 {
+                    return false; // the middle is buried
+                }
+                let mut got = row.direct;
+                for landing in row.landings.iter() {
+                    let (triangle, side) = landing.place();
+                    let (u, v) = landing.uv();
+                    let (node, w) = self.elements.locate(triangle, u, v);
+                    let corners = self.elements.nodes[node as usize].vertices;
+                    got +=
+                        landing.weight() * (0..3).map(|i| values[slot(corners[i], side)] * w[i]).sum::<Rgb>();
+                }
+                let known = vertices.map(|v| slot(v, side)).into_iter().filter(|&s| self.field.usable(s));
+                let (sum, count) = known.fold((Rgb::BLACK, 0.0), |(s, n), slot| (s + values[slot], n + 1.0));
+                if count == 0.0 {
+                    return true; // no corner knows anything of it
+                }
+                let predicted = sum.mean() / count;
+                let off = (got.mean() - predicted).abs();
+                // Twice as bright or half as dark, and beyond two standard errors of so few rays.
+                off > 0.5 * (predicted + floor) && off * off > 4.0 * row.variance
+            },
+        )
+    }
+
+    /// Direct irradiance at every slot, lx: `samples` light samples at each site.
+    pub(crate) fn direct(&self, samples: u32) -> Vec<Rgb> {
+        let vertices: Vec<VertexId> = self.field.sites.iter().map(|s| s.vertex).collect();
+        let origins = self.origins(&vertices);
+        let at_sites: Vec<Rgb> = self
+            .field
+            .sites
+            .par_iter()
+            .map(|site| {
+                let v = &self.elements.vertices[site.vertex as usize];
+                let Some(origins) = origins.get(&site.vertex) else { return Rgb::BLACK };
+                let turned = turned(origins, site.side);
+                let stream = slot(site.vertex, site.side) as u64;
+                gather::direct(
+                    self.world,
+                    &turned,
+                    v.normal * site.side.sign(),
+                    samples,
+                    self.config.seed,
+                    stream,
+                )
+            })
+            .collect();
+        self.field.spread(&at_sites)
+    }
+}
+
+/// The origins seen from `side`.
+fn turned(origins: &[Origin], side: Side) -> Vec<Origin> {
+    origins.iter().map(|o| Origin { ng: o.ng * side.sign(), ..*o }).collect()
+}
