@@ -65,7 +65,8 @@ impl<'a> Refiner<'a> {
     /// The first mesh: no edge longer than h0, sites where clusters of vertices need them, all gathered.
     pub(crate) fn start(world: &'a World, config: &'a Config, progress: &'a dyn Progress) -> Refiner<'a> {
         let scale = world.scale;
-        let (h0, h_min, radius) = (config.h0 * scale, config.h_min * scale, config.cluster_radius * scale);
+        let (h0, h_min, mut radius) =
+            (config.h0 * scale, config.h_min * scale, config.cluster_radius * scale);
         let mut elements = Elements::new(&world.scene.mesh);
         let most = config.most_vertices.max(2 * elements.vertices.len());
         // A landscape outside may not eat up the first mesh: its elements stay coarse.
@@ -93,11 +94,20 @@ impl<'a> Refiner<'a> {
             radius,
         };
         let used = refiner.used();
-        let chosen = cluster::spread_out(
-            &refiner.elements.vertices,
-            (0..used.len() as VertexId).filter(|&v| used[v as usize]),
-            radius,
-        );
+        let choose = |radius: f32| {
+            let candidates = (0..used.len() as VertexId).filter(|&v| used[v as usize]);
+            cluster::spread_out(&refiner.elements.vertices, candidates, radius)
+        };
+        let mut chosen = choose(radius);
+        // Finely modelled scenes: half of the sites at most go to the first mesh, each reaching further if need be.
+        for _ in 0..8 {
+            if chosen.len() <= config.most_sites / 2 {
+                break;
+            }
+            radius *= 1.5;
+            chosen = choose(radius);
+        }
+        refiner.radius = radius;
         refiner.gather(&chosen);
         refiner
     }
