@@ -85,7 +85,7 @@ impl Caustics {
         photons.truncate(MOST); // bounded by memory; with 32 landings a particle it takes 62 500 particles at least
         let mut axes = vec![0; photons.len()];
         balance(&mut photons, &mut axes);
-        Caustics { photons, axes, reach: 0.03 * world.scale, sent: last * BATCH }
+        Caustics { photons, axes, reach: 0.1 * world.scale, sent: last * BATCH }
     }
 
     /// Number of photons kept.
