@@ -2,6 +2,8 @@
 
 mod bench_rays;
 mod check;
+#[expect(dead_code, reason = "the command that fills it comes next")]
+mod comparison;
 #[cfg(test)]
 mod ourselves;
 mod scenes;

@@ -1,0 +1,3 @@
+//! `cargo xtask reference-comparison`: how fast, how exact, compared with what.
+
+pub mod results;
