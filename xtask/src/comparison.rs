@@ -1,3 +1,4 @@
 //! `cargo xtask reference-comparison`: how fast, how exact, compared with what.
 
+pub mod report;
 pub mod results;
