@@ -27,6 +27,7 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
     }
     bars.listen_for_interrupts();
 
+    let mut clock = Instant::now();
     bars.stage("load", 0);
     let mut loaded = load::scene(&job.scene)?;
     for warning in &loaded.warnings {
@@ -43,33 +44,40 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
         bars.note("warning: nothing in the file shines, the picture will be black: try --sky 1000 (cd/m2)");
     }
 
+    // What all pictures share is told with the first.
+    let mut shared = vec![("load", lap(&mut clock))];
     bars.stage("build", 0);
     let world = World::new(loaded.scene);
+    shared.push(("build", lap(&mut clock)));
     let several = job.camera.as_deref() == Some("all");
     let mut pictures = Vec::new();
-    let (mut solution, mut prepass_seconds) = (None, 0.0);
+    let (mut solution, mut rays_before) = (None, 0);
     for camera in &choice.cameras {
         let path = |base: &Path| if several { with_name(base, &camera.name) } else { base.to_path_buf() };
         let (output, preview) = (path(&job.output), job.preview.as_deref().map(path));
         let settings = job.settings(camera)?;
-        let started = Instant::now();
         if settings.integrator == Integrator::Hybrid && solution.is_none() {
             // Light does not know where we stand: one solution serves all views.
             solution = Some(
                 prepass(&world, &settings, &bars)
                     .with_context(|| format!("cannot solve {}", job.scene.display()))?,
             );
-            prepass_seconds = started.elapsed().as_secs_f64();
+            shared.push(("prepass", lap(&mut clock)));
         }
         let mut outcome = render(&world, camera, solution.as_ref(), &settings, &bars)?;
-        outcome.report.stages.insert(0, ("prepass", std::mem::take(&mut prepass_seconds)));
+        outcome.report.stages.splice(0..0, shared.drain(..));
+        lap(&mut clock);
         bars.done();
         if !outcome.finished && outcome.film.is_blank() {
             // An old picture is worth more than a black one.
             let why = if bars.interrupted() { "stopped" } else { "the time was up" };
             anyhow::bail!("{why} before a pixel was rendered: {} is not written", output.display());
         }
-        let picture = save(&job, camera, &settings, outcome, output, preview, started)?;
+        let mut picture = save(&job, camera, &settings, outcome, output, preview)?;
+        picture.stages.insert("write", lap(&mut clock));
+        picture.seconds = picture.stages.values().sum();
+        let rays = world.bvh.rays_cast();
+        picture.rays = rays - std::mem::replace(&mut rays_before, rays);
         if picture.repaired > 0 {
             let message = "pixels were not finite or negative and are black instead; please report it";
             bars.note(&format!("warning: {} {message}", picture.repaired));
@@ -97,7 +105,7 @@ struct Report {
     pictures: Vec<Picture>,
 }
 
-/// One picture that was written.
+/// One picture that was written. What all pictures share, up to the prepass, is counted with the first.
 #[derive(Serialize)]
 struct Picture {
     output: PathBuf,
@@ -107,6 +115,7 @@ struct Picture {
     height: u32,
     finished: bool,
     seconds: f64,
+    rays: u64,
     stages: BTreeMap<&'static str, f64>,
     exposure: Option<f32>,
     repaired: u64,
@@ -136,6 +145,12 @@ impl Picture {
     }
 }
 
+/// Seconds since `clock` was last asked.
+fn lap(clock: &mut Instant) -> f64 {
+    let now = Instant::now();
+    now.duration_since(std::mem::replace(clock, now)).as_secs_f64()
+}
+
 /// Writes what was rendered.
 fn save(
     job: &RenderJob,
@@ -144,7 +159,6 @@ fn save(
     outcome: Outcome,
     output: PathBuf,
     preview: Option<PathBuf>,
-    started: Instant,
 ) -> Result<Picture> {
     let Outcome { film, finished, report } = outcome;
     exr::write(&film, &metadata(camera, settings, finished, &report.texts), &output)?;
@@ -162,7 +176,8 @@ fn save(
         width: film.width,
         height: film.height,
         finished,
-        seconds: started.elapsed().as_secs_f64(),
+        seconds: 0.0,
+        rays: 0,
         stages: report.stages.into_iter().collect(),
         exposure,
         repaired: film.repaired,

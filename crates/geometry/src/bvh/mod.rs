@@ -8,6 +8,7 @@
 //! 2(1), 2013): no ray passes between two triangles that share an edge or a corner.
 
 mod binary;
+mod count;
 mod items;
 mod kernel;
 mod plan;
@@ -21,6 +22,7 @@ mod wide;
 
 use crate::Mesh;
 use crate::math::Vec3;
+use count::Count;
 pub use kernel::Kernel;
 use kernel::Tracer;
 use wide::Tree;
@@ -68,6 +70,7 @@ pub struct Hit {
 pub struct Bvh {
     tree: Tree,
     tracer: Tracer,
+    count: Count,
 }
 
 impl Bvh {
@@ -80,7 +83,7 @@ impl Bvh {
     pub fn build_for(mesh: &Mesh, kernel: Kernel) -> Bvh {
         let (items, order) = items::items(mesh);
         let tree = wide::fold(mesh, binary::build(mesh, &items, order));
-        Bvh { tree, tracer: Tracer::new(kernel).unwrap_or(Tracer::Portable) }
+        Bvh { tree, tracer: Tracer::new(kernel).unwrap_or(Tracer::Portable), count: Count::default() }
     }
 
     /// The nearest triangle that the ray meets within (t_min, t_max), from either side.
@@ -89,13 +92,20 @@ impl Bvh {
     /// nothing.
     #[inline]
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        self.count.add_one();
         self.tracer.closest_hit(&self.tree, ray)
     }
 
     /// Whether the ray meets any triangle within (t_min, t_max).
     #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
+        self.count.add_one();
         self.tracer.occluded(&self.tree, ray)
+    }
+
+    /// Rays asked of either function since the tree was built, by all threads.
+    pub fn rays_cast(&self) -> u64 {
+        self.count.total()
     }
 
     /// Memory that the tree takes, bytes.
