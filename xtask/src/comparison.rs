@@ -1,4 +1,153 @@
 //! `cargo xtask reference-comparison`: how fast, how exact, compared with what.
+//!
+//! Every picture is made by a whole process (`twolight`, or another renderer by its script in `xtask/peers`), timed
+//! from start to end, and held against a reference by the metric of `twolight compare`. What was found is written to
+//! `results.json` after every picture, so that nothing is lost when a run is stopped, and shown by `index.html`.
 
+mod climb;
+mod machine;
+mod measure;
+mod method;
+mod peer;
+mod process;
 pub mod report;
 pub mod results;
+mod sanity;
+mod scene;
+
+use anyhow::{Context, Result, ensure};
+use climb::Climber;
+use method::Method;
+use results::{Results, Scene};
+use scene::Subject;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::process::Command;
+
+/// What to compare.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  cargo xtask reference-comparison                             all of it, under an hour on two cores
+  cargo xtask reference-comparison --only cornell-box --peers none --longest 5
+  cargo xtask reference-comparison --report                    the page once more, from results.json
+
+Without --peers, every other renderer that is installed takes part; the scripts in xtask/peers say how to install
+them, and none is needed. Open index.html in the folder of --out.")]
+pub struct Args {
+    /// Only these scenes, by the stems of their files
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    only: Vec<String>,
+    /// Only these methods of ours: vertex, split, gather, path; or none
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "all")]
+    methods: Vec<String>,
+    /// Other renderers: mitsuba, mitsuba-oidn, cycles, cycles-oidn, luxcore, povray, radiance; or none
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "all")]
+    peers: Vec<String>,
+    /// Threads of every renderer; one for each processor if absent
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    threads: Option<u32>,
+    /// A method whose run took longer than this climbs its ladder of settings no further
+    #[arg(long, value_name = "SECONDS", default_value_t = 20.0)]
+    longest: f64,
+    /// Keep what results.json in --out already holds, but for the curves measured now
+    #[arg(long)]
+    keep: bool,
+    /// Measure nothing: write the page anew from results.json
+    #[arg(long)]
+    report: bool,
+    /// Folder for results.json, index.html and the pictures
+    #[arg(long, value_name = "DIR", default_value = "target/reference-comparison")]
+    out: PathBuf,
+}
+
+/// Does what was asked.
+pub fn run(args: Args) -> Result<()> {
+    let out = crate::root().join(&args.out);
+    let file = out.join("results.json");
+    if args.report {
+        return report::write(&Results::read(&file)?, &out);
+    }
+    let methods = chosen(method::ours(), &args.methods)?;
+    let peers = chosen(peer::all(), &args.peers)?;
+    let methods: Vec<Method> = methods.into_iter().chain(peers).collect();
+    build()?;
+    std::fs::create_dir_all(&out).with_context(|| format!("making {}", out.display()))?;
+
+    let threads = args.threads.unwrap_or_else(machine::cores);
+    let before = if args.keep && file.is_file() { Results::read(&file)? } else { Results::default() };
+    let mut results = Results {
+        commit: machine::commit(),
+        date: machine::date(),
+        machine: machine::machine(),
+        threads,
+        ..before
+    };
+    results.versions.insert("twolight".into(), format!("{} ({})", env!("CARGO_PKG_VERSION"), results.commit));
+
+    let mut climber = Climber {
+        threads,
+        longest: args.longest,
+        out: &out,
+        absent: BTreeMap::new(),
+        versions: BTreeMap::new(),
+    };
+    for subject in subjects(&args)? {
+        climber.climb(&subject, &methods, |scene, versions| {
+            results.versions.extend(versions.clone());
+            put(&mut results.scenes, scene);
+            results.write(&file)
+        })?;
+    }
+    report::write(&results, &out)?;
+    println!("\n{}", out.join("index.html").display());
+    Ok(())
+}
+
+/// The scenes asked for.
+fn subjects(args: &Args) -> Result<Vec<Subject>> {
+    let mut subjects = scene::of_assets(&crate::root().join("assets"))?;
+    let names: Vec<String> = subjects.iter().map(|s| s.name.clone()).collect();
+    for name in &args.only {
+        ensure!(names.contains(name), "no scene {name:?} with a reference; there are {}", names.join(", "));
+    }
+    subjects.retain(|s| args.only.is_empty() || args.only.contains(&s.name));
+    Ok(subjects)
+}
+
+/// Those of `methods` whose keys `asked` names; `all` and `none` mean what they say.
+fn chosen(methods: Vec<Method>, asked: &[String]) -> Result<Vec<Method>> {
+    let keys: Vec<&str> = methods.iter().map(|method| method.key).collect();
+    for name in asked {
+        let known = keys.contains(&name.as_str()) || name == "all" || name == "none";
+        ensure!(known, "no method {name:?}; there are {}", keys.join(", "));
+    }
+    let all = asked.iter().any(|name| name == "all");
+    Ok(methods.into_iter().filter(|method| all || asked.iter().any(|name| name == method.key)).collect())
+}
+
+/// Builds what is measured.
+fn build() -> Result<()> {
+    let status = Command::new("cargo")
+        .args(["build", "--release", "--package", "twolight"])
+        .current_dir(crate::root())
+        .status()
+        .context("starting cargo")?;
+    ensure!(status.success(), "twolight does not build");
+    Ok(())
+}
+
+/// Puts what was measured of a scene into the results: its curves replace those of the same method.
+fn put(scenes: &mut Vec<Scene>, measured: &Scene) {
+    let Some(scene) = scenes.iter_mut().find(|scene| scene.name == measured.name) else {
+        return scenes.push(measured.clone());
+    };
+    let mut curves = std::mem::take(&mut scene.curves);
+    for curve in &measured.curves {
+        match curves.iter_mut().find(|old| old.method == curve.method) {
+            Some(old) => *old = curve.clone(),
+            None => curves.push(curve.clone()),
+        }
+    }
+    *scene = Scene { curves, ..measured.clone() };
+}

@@ -2,7 +2,6 @@
 
 mod bench_rays;
 mod check;
-#[expect(dead_code, reason = "the command that fills it comes next")]
 mod comparison;
 #[cfg(test)]
 mod ourselves;
@@ -31,6 +30,8 @@ enum Chore {
         #[arg(long, value_parser = clap::builder::PossibleValuesParser::new(check::names()))]
         without: Vec<String>,
     },
+    /// Compare speed and error with references and other renderers
+    ReferenceComparison(comparison::Args),
     /// Write the scenes that a function describes into assets/
     Scenes {
         /// Write nothing; fail if a file in assets/ differs from what its function gives
@@ -49,6 +50,7 @@ fn main() -> Result<()> {
     match Args::parse().chore {
         Chore::Bench(Bench::Rays(args)) => bench_rays::run(args),
         Chore::Check { without } => check::run(&without),
+        Chore::ReferenceComparison(args) => comparison::run(args),
         Chore::Scenes { check: false } => scenes::write(&root().join("assets")),
         Chore::Scenes { check: true } => scenes::check(&root().join("assets")),
     }
