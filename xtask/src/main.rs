@@ -1,5 +1,6 @@
 //! Our chores, as `cargo xtask NAME`.
 
+mod base64;
 mod bench_rays;
 mod check;
 mod comparison;

@@ -225,7 +225,7 @@ impl Document {
 
     /// A `.gltf` file: JSON that one can read, its buffer within it as base64.
     pub fn into_gltf(mut self) -> Vec<u8> {
-        let uri = format!("data:application/octet-stream;base64,{}", base64(&self.buffer));
+        let uri = format!("data:application/octet-stream;base64,{}", crate::base64::base64(&self.buffer));
         let json = self.json(json!({ "byteLength": self.buffer.len(), "uri": uri }));
         let mut bytes = serde_json::to_vec_pretty(&json).expect("a JSON value can always be written");
         bytes.push(b'\n');
@@ -259,32 +259,9 @@ fn round(x: f64) -> f64 {
     (x * 1e7).round() / 1e7 + 0.0
 }
 
-/// Base64 with padding (RFC 4648, section 4).
-fn base64(bytes: &[u8]) -> String {
-    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for chunk in bytes.chunks(3) {
-        let word = chunk.iter().fold(0u32, |w, &b| w << 8 | u32::from(b)) << (8 * (3 - chunk.len()));
-        for i in 0..4 {
-            let digit = DIGITS[(word >> (18 - 6 * i)) as usize & 63];
-            text.push(if i <= chunk.len() { char::from(digit) } else { '=' });
-        }
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn base64_gives_the_vectors_of_rfc_4648() {
-        for (plain, coded) in
-            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")]
-        {
-            assert_eq!(base64(plain.as_bytes()), coded);
-        }
-    }
 
     #[test]
     fn a_glb_states_its_own_length() {
