@@ -187,7 +187,6 @@ impl Results {
 impl Curve {
     /// Seconds this method needs for `error`, read off between its points on the log-log chart; `None` where it never
     /// got there. Only points on its own lower-left hull count: a slower point with a larger error says nothing.
-    #[expect(dead_code, reason = "the page will show it")]
     pub fn seconds_to(&self, error: f64) -> Option<f64> {
         let mut points: Vec<&Point> = self.points.iter().filter(|p| p.error > 0.0).collect();
         points.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
