@@ -4,23 +4,27 @@
 //! from start to end, and held against a reference by the metric of `twolight compare`. What was found is written to
 //! `results.json` after every picture, so that nothing is lost when a run is stopped, and shown by `index.html`.
 
+mod anywhere;
+mod baseline;
 mod climb;
 mod machine;
 mod measure;
 mod method;
 mod peer;
 mod process;
+mod quick;
 pub mod report;
 pub mod results;
 mod sanity;
 mod scene;
 
 use anyhow::{Context, Result, ensure};
+use anywhere::Making;
 use climb::Climber;
 use method::Method;
 use results::{Results, Scene};
 use scene::Subject;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::process::Command;
 
@@ -30,11 +34,26 @@ use std::process::Command;
 Examples:
   cargo xtask reference-comparison                             all of it, under an hour on two cores
   cargo xtask reference-comparison --only cornell-box --peers none --longest 5
+  cargo xtask reference-comparison --quick                     is this state worse than the last?
+  cargo xtask reference-comparison --scenes my-rooms --reference-seconds 120
   cargo xtask reference-comparison --report                    the page once more, from results.json
 
 Without --peers, every other renderer that is installed takes part; the scripts in xtask/peers say how to install
 them, and none is needed. Open index.html in the folder of --out.")]
 pub struct Args {
+    /// Is this state worse than the last? Our errors beside assets/reference/baseline.json, in under two minutes;
+    /// fails, naming scenes and numbers, if one rose by more than noise
+    #[arg(long, conflicts_with_all = ["baseline", "report"])]
+    quick: bool,
+    /// Write that baseline anew: every scene with a dozen seeds
+    #[arg(long, conflicts_with = "report")]
+    baseline: bool,
+    /// Scenes of your own, .gltf and .glb, in place of those in assets/; Mitsuba makes their references
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["quick", "baseline"])]
+    scenes: Option<PathBuf>,
+    /// How long Mitsuba may take for a reference of --scenes; it is kept in target/own-references
+    #[arg(long, value_name = "SECONDS", default_value_t = 600.0, requires = "scenes")]
+    reference_seconds: f64,
     /// Only these scenes, by the stems of their files
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     only: Vec<String>,
@@ -68,13 +87,18 @@ pub fn run(args: Args) -> Result<()> {
     if args.report {
         return report::write(&Results::read(&file)?, &out);
     }
+    let threads = args.threads.unwrap_or_else(machine::cores);
+    if args.quick || args.baseline {
+        build()?;
+        let subjects = subjects(&args)?;
+        return if args.quick { quick::check(&subjects, threads) } else { quick::write(&subjects, threads) };
+    }
     let methods = chosen(method::ours(), &args.methods)?;
     let peers = chosen(peer::all(), &args.peers)?;
     let methods: Vec<Method> = methods.into_iter().chain(peers).collect();
     build()?;
     std::fs::create_dir_all(&out).with_context(|| format!("making {}", out.display()))?;
 
-    let threads = args.threads.unwrap_or_else(machine::cores);
     let before = if args.keep && file.is_file() { Results::read(&file)? } else { Results::default() };
     let mut results = Results {
         commit: machine::commit(),
@@ -89,7 +113,7 @@ pub fn run(args: Args) -> Result<()> {
         threads,
         longest: args.longest,
         out: &out,
-        absent: BTreeMap::new(),
+        absent: BTreeSet::new(),
         versions: BTreeMap::new(),
     };
     for subject in subjects(&args)? {
@@ -106,6 +130,11 @@ pub fn run(args: Args) -> Result<()> {
 
 /// The scenes asked for.
 fn subjects(args: &Args) -> Result<Vec<Subject>> {
+    if let Some(folder) = &args.scenes {
+        let threads = args.threads.unwrap_or_else(machine::cores);
+        let making = Making { threads, seconds: args.reference_seconds };
+        return anywhere::of_folder(folder, &args.only, making);
+    }
     let mut subjects = scene::of_assets(&crate::root().join("assets"))?;
     let names: Vec<String> = subjects.iter().map(|s| s.name.clone()).collect();
     for name in &args.only {

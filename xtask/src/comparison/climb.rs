@@ -6,7 +6,7 @@ use super::results::{Curve, Scene};
 use super::sanity;
 use super::scene::Subject;
 use anyhow::Result;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -23,8 +23,8 @@ pub struct Climber<'a> {
     pub longest: f64,
     /// Folder of `results.json`.
     pub out: &'a Path,
-    /// Renderers that turned out not to be installed, and what they said.
-    pub absent: BTreeMap<&'static str, String>,
+    /// Methods whose renderer, or denoiser, turned out not to be installed.
+    pub absent: BTreeSet<&'static str>,
     /// Renderers that took part.
     pub versions: BTreeMap<String, String>,
 }
@@ -43,7 +43,7 @@ impl Climber<'_> {
         for step in 0.. {
             let mut rendered = Vec::new();
             for (i, method) in methods.iter().enumerate() {
-                if !climbing[i] || step >= method.ladder.len() || self.is_absent(method) {
+                if !climbing[i] || step >= method.ladder.len() || self.absent.contains(method.key) {
                     continue;
                 }
                 match self.picture(subject, method, step, &mut scene.curves[i])? {
@@ -76,10 +76,6 @@ impl Climber<'_> {
         Ok(scene)
     }
 
-    fn is_absent(&self, method: &Method) -> bool {
-        matches!(method.program, Program::Peer(name) if self.absent.contains_key(name))
-    }
-
     /// One picture and its point at the end of `curve`; `None`, with a note where it is worth one, if there is none.
     fn picture(
         &mut self,
@@ -94,10 +90,8 @@ impl Climber<'_> {
         let told = match self.render(subject, method, step, &self.out.join(&picture))? {
             Outcome::Done(told) => told,
             Outcome::Absent(why) => {
-                if let Program::Peer(name) = method.program {
-                    println!("{name} does not take part: {why}");
-                    self.absent.insert(name, why);
-                }
+                println!("{} does not take part: {why}", method.key);
+                self.absent.insert(method.key);
                 return Ok(None);
             }
             Outcome::Failed(why) => {

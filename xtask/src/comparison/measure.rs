@@ -71,6 +71,11 @@ const BEYOND_IT: i32 = 4;
 
 /// Renders one picture; ends the renderer after `limit`.
 pub fn render(program: Program, rung: &Rung, shot: Shot, limit: Duration) -> Result<Outcome> {
+    if let Program::Peer(name) = program
+        && !crate::root().join(format!("xtask/peers/render_{name}.py")).is_file()
+    {
+        return Ok(Outcome::Absent("xtask/peers has no script for it".into()));
+    }
     if shot.out.exists() {
         // Or a renderer that writes nothing would be measured by an older picture.
         std::fs::remove_file(shot.out).with_context(|| format!("removing {}", shot.out.display()))?;

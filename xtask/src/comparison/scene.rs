@@ -42,6 +42,8 @@ pub struct Inspected {
 pub struct InspectedCamera {
     /// Its name.
     pub name: String,
+    /// Width over height, if the file states it.
+    pub aspect: Option<f32>,
 }
 
 /// The scenes in the folder `assets` that have references in its folder `reference`, in order of their names. Where a

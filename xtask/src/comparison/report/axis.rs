@@ -1,6 +1,6 @@
 //! An axis whose ticks are 1, 2 or 5 times a power of ten, and whose ends are ticks.
 
-use super::words::short;
+use super::words::number;
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use std::ops::Range;
 
@@ -50,7 +50,13 @@ impl Axis {
 
     /// What is written at a tick.
     pub fn label(&self, tick: f64) -> String {
-        format!("{}{}", short(tick), self.unit)
+        // Two digits tell 1.5 from 2; trailing zeros would tell nothing.
+        let text = number(tick, 2);
+        let text = match text.contains('.') {
+            true => text.trim_end_matches('0').trim_end_matches('.').to_string(),
+            false => text,
+        };
+        format!("{text}{}", self.unit)
     }
 }
 
