@@ -11,41 +11,15 @@ The camera: as in twolight, `yfov` is the angle over the picture's height and th
 gives the width, whatever `aspect` the file states.
 """
 
-import base64
-import json
 import math
-import struct
 from dataclasses import dataclass, field
 from pathlib import Path
-from urllib.parse import unquote
 
 import numpy as np
+from gltf_file import File, Unsupported
+from gltf_shape import face_normals, tangents, triangle_list, turn_to_front, unit, unshare
 
-WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-COMPONENTS = {
-    5120: np.int8,
-    5121: np.uint8,
-    5122: np.int16,
-    5123: np.uint16,
-    5125: np.uint32,
-    5126: np.float32,
-}
 WRAPS = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
-MODELLED = {
-    "KHR_lights_punctual",
-    "KHR_materials_emissive_strength",
-    "KHR_materials_ior",
-    "KHR_materials_specular",
-    "KHR_materials_transmission",
-    "KHR_materials_unlit",
-    "KHR_materials_volume",
-    "KHR_mesh_quantization",
-    "KHR_texture_transform",
-}
-
-
-class Unsupported(Exception):
-    """The file needs something that is not read here."""
 
 
 @dataclass
@@ -57,7 +31,7 @@ class Image:
 
     @property
     def suffix(self):
-        """ ".png" or ".jpg", by the first bytes."""
+        """What a file of it ends in, by the first bytes."""
         return ".png" if self.data[:4] == b"\x89PNG" else ".jpg"
 
 
@@ -102,6 +76,11 @@ class Material:
     thickness: float = 0.0  # > 0: bounds a volume and refracts (the mesh says how thick); 0: a thin wall
     attenuation_color: tuple = (1.0, 1.0, 1.0)
     attenuation_distance: float = math.inf  # m
+
+    @property
+    def textures(self):
+        """Those it has."""
+        return [value for value in vars(self).values() if isinstance(value, Texture)]
 
     @property
     def is_emissive(self):
@@ -208,82 +187,12 @@ def load(path):
     return _Reader(Path(path)).scene()
 
 
-def unit(v):
-    """The vectors `v` (…, 3), each made of length 1; those of length 0 stay."""
-    length = np.linalg.norm(v, axis=-1, keepdims=True)
-    return v / np.where(length > 0, length, 1)
-
-
 class _Reader:
     """A file being read."""
 
     def __init__(self, path):
-        self.folder = path.parent
-        data = path.read_bytes()
-        self.glb_buffer = None
-        if data[:4] == b"glTF":
-            size = struct.unpack_from("<I", data, 12)[0]
-            self.json = json.loads(data[20 : 20 + size])
-            if len(data) > 28 + size:
-                length = struct.unpack_from("<I", data, 20 + size)[0]
-                self.glb_buffer = data[28 + size : 28 + size + length]
-        else:
-            self.json = json.loads(data)
-        missing = [e for e in self.json.get("extensionsRequired", []) if e not in MODELLED]
-        if missing:
-            raise Unsupported(f"the file requires {', '.join(missing)}")
-        ignored = [e for e in self.json.get("extensionsUsed", []) if e not in MODELLED]
-        self.notes = [f"{extension} is left out" for extension in ignored]
-        self.buffers = [self._buffer(b) for b in self.json.get("buffers", [])]
-
-    def _buffer(self, buffer):
-        return self._uri(buffer["uri"]) if "uri" in buffer else self.glb_buffer
-
-    def _uri(self, uri):
-        if uri.startswith("data:"):
-            head, body = uri.split(",", 1)
-            return base64.b64decode(body) if head.endswith(";base64") else unquote(body).encode("latin-1")
-        plain = self.folder / uri
-        return (plain if plain.exists() else self.folder / unquote(uri)).read_bytes()
-
-    def _view(self, index, offset=0):
-        """Bytes of a buffer view from `offset` on, and its stride or None."""
-        view = self.json["bufferViews"][index]
-        start = view.get("byteOffset", 0)
-        return self.buffers[view["buffer"]][start + offset : start + view["byteLength"]], view.get(
-            "byteStride"
-        )
-
-    def _rows(self, view, offset, count, width, dtype):
-        data, stride = self._view(view, offset)
-        size = width * dtype.itemsize
-        stride = stride or size
-        if count == 0:
-            return np.empty((0, width), dtype)
-        flat = np.frombuffer(data, np.uint8, (count - 1) * stride + size)
-        rows = np.lib.stride_tricks.as_strided(flat, (count, size), (stride, 1))
-        return np.ascontiguousarray(rows).view(dtype)
-
-    def accessor(self, index):
-        """An accessor's rows: floats where it is normalised, else its own type."""
-        a = self.json["accessors"][index]
-        width, dtype = WIDTHS[a["type"]], np.dtype(COMPONENTS[a["componentType"]])
-        if "bufferView" in a:
-            rows = self._rows(a["bufferView"], a.get("byteOffset", 0), a["count"], width, dtype)
-        else:
-            rows = np.zeros((a["count"], width), dtype)
-        if "sparse" in a:
-            s, rows = a["sparse"], rows.copy()
-            where = s["indices"]
-            kind = np.dtype(COMPONENTS[where["componentType"]])
-            at = self._rows(where["bufferView"], where.get("byteOffset", 0), s["count"], 1, kind)
-            values = s["values"]
-            rows[at[:, 0]] = self._rows(
-                values["bufferView"], values.get("byteOffset", 0), s["count"], width, dtype
-            )
-        if a.get("normalized") and dtype.kind in "iu":
-            rows = np.maximum(rows.astype(np.float32) / np.iinfo(dtype).max, -1)
-        return rows
+        self.file = File(path)
+        self.json = self.file.json
 
     def scene(self):
         """Everything, flattened."""
@@ -297,7 +206,7 @@ class _Reader:
                 placed = [self._primitive(p, world, name) for p in mesh["primitives"]]
                 meshes += [m for m in placed if m is not None]
                 if "skin" in node:
-                    self._note("skins are left out: meshes stand in their bind pose")
+                    self.file.note("skins are left out: meshes stand in their bind pose")
             if "camera" in node:
                 cameras.append(self._camera(node, world))
             if "KHR_lights_punctual" in node.get("extensions", {}):
@@ -305,11 +214,7 @@ class _Reader:
         if not meshes:
             raise Unsupported("the scene shows no triangles")
         images = [self._image(image, i) for i, image in enumerate(self.json.get("images", []))]
-        return Scene(meshes, self.materials, images, lights, cameras, self.notes)
-
-    def _note(self, text):
-        if text not in self.notes:
-            self.notes.append(text)
+        return Scene(meshes, self.materials, images, lights, cameras, self.file.notes)
 
     def _nodes(self):
         """Nodes of the default scene with their 4×4 transforms to the world, parents first."""
@@ -328,15 +233,15 @@ class _Reader:
 
     def _primitive(self, primitive, world, name):
         """A `Mesh`, or None for points and lines."""
-        attributes = {k: self.accessor(v).astype(np.float32) for k, v in primitive["attributes"].items()}
+        attributes = {k: self.file.accessor(v).astype(np.float32) for k, v in primitive["attributes"].items()}
         positions = attributes["POSITION"]
         if "indices" in primitive:
-            corners = self.accessor(primitive["indices"])[:, 0].astype(np.uint32)
+            corners = self.file.accessor(primitive["indices"])[:, 0].astype(np.uint32)
         else:
             corners = np.arange(len(positions), dtype=np.uint32)
-        triangles = _triangles(primitive.get("mode", 4), corners)
+        triangles = triangle_list(primitive.get("mode", 4), corners)
         if triangles is None:
-            self._note("points and lines are left out")
+            self.file.note("points and lines are left out")
             return None
         linear = world[:3, :3]
         if np.linalg.det(linear) < 0:
@@ -370,15 +275,15 @@ class _Reader:
                 along = unit(attributes["TANGENT"][:, :3].astype(np.float64) @ linear.T)
                 side = attributes["TANGENT"][:, 3:] * (-1 if np.linalg.det(linear) < 0 else 1)
                 mesh.tangents = np.hstack([along, side]).astype(np.float32)
-            _turn_to_front(mesh)
+            turn_to_front(mesh)
         else:
-            _unshare(mesh, np.arange(len(mesh.triangles)))
-            mesh.normals = np.repeat(_face_normals(mesh), 3, axis=0).astype(np.float32)
+            unshare(mesh, np.arange(len(mesh.triangles)))
+            mesh.normals = np.repeat(face_normals(mesh), 3, axis=0).astype(np.float32)
         normal_map = self.materials[material].normal_texture
         if normal_map is None:
             mesh.tangents = None
         elif mesh.tangents is None and mesh.uvs[normal_map.uv_set] is not None:
-            mesh.tangents = _tangents(mesh, mesh.uvs[normal_map.uv_set])
+            mesh.tangents = tangents(mesh, mesh.uvs[normal_map.uv_set])
         return mesh
 
     def _material(self, m, number):
@@ -421,12 +326,12 @@ class _Reader:
             return None
         texture = self.json["textures"][info["index"]]
         if "source" not in texture:
-            self._note("textures in a format of an extension are left out")
+            self.file.note("textures in a format of an extension are left out")
             return None
         placed = info.get("extensions", {}).get("KHR_texture_transform", {})
         uv_set = placed.get("texCoord", info.get("texCoord", 0))
         if uv_set > 1:
-            self._note("textures that use a uv set beyond TEXCOORD_1 are left out")
+            self.file.note("textures that use a uv set beyond TEXCOORD_1 are left out")
             return None
         sampler = self.json["samplers"][texture["sampler"]] if "sampler" in texture else {}
         (u, v), (su, sv), angle = (
@@ -446,7 +351,9 @@ class _Reader:
         )
 
     def _image(self, image, number):
-        data = self._view(image["bufferView"])[0] if "bufferView" in image else self._uri(image["uri"])
+        data = (
+            self.file.view(image["bufferView"])[0] if "bufferView" in image else self.file.uri(image["uri"])
+        )
         return Image(image.get("name", f"image {number}"), bytes(data))
 
     def _light(self, node, world):
@@ -502,65 +409,3 @@ def _local(node):
     result[:3, :3] = rotation * np.array(node.get("scale", [1, 1, 1]), np.float64)
     result[:3, 3] = node.get("translation", [0, 0, 0])
     return result
-
-
-def _triangles(mode, corners):
-    """Lists, strips and fans as (m, 3); None for points and lines."""
-    if mode == 4:
-        return corners[: len(corners) // 3 * 3].reshape(-1, 3)
-    if mode == 5:
-        t = np.arange(max(len(corners) - 2, 0))
-        return corners[np.stack([t, t + 1 + t % 2, t + 2 - t % 2], axis=1)]
-    if mode == 6:
-        t = np.arange(max(len(corners) - 2, 0))
-        return corners[np.stack([t + 1, t + 2, 0 * t], axis=1)]
-    return None
-
-
-def _face_normals(mesh):
-    a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
-    return unit(np.cross(b - a, c - a))
-
-
-def _unshare(mesh, faces):
-    """Gives the triangles of these numbers corners of their own."""
-    corners = mesh.triangles[faces].reshape(-1)
-    kept = np.arange(len(mesh.positions)) if len(faces) < len(mesh.triangles) else np.arange(0)
-    pick = np.concatenate([kept, corners])
-    for name in ("positions", "normals", "colors", "tangents"):
-        if getattr(mesh, name) is not None:
-            setattr(mesh, name, getattr(mesh, name)[pick])
-    mesh.uvs = [None if uv is None else uv[pick] for uv in mesh.uvs]
-    mesh.triangles = mesh.triangles.copy()
-    mesh.triangles[faces] = len(kept) + np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
-
-
-def _turn_to_front(mesh):
-    """The winding says which side is the front: normals of triangles wound against them are turned round."""
-    faces = _face_normals(mesh)
-    agree = np.einsum("tki,ti->t", mesh.normals[mesh.triangles].astype(np.float64), faces)
-    against = np.flatnonzero(agree < 0)
-    if len(against):
-        _unshare(mesh, against)
-        mesh.normals[mesh.triangles[against]] *= -1
-    missing = np.flatnonzero(~mesh.normals[mesh.triangles].any(axis=2).all(axis=1))
-    if len(missing):
-        _unshare(mesh, missing)
-        mesh.normals[mesh.triangles[missing]] = faces[missing, None]
-
-
-def _tangents(mesh, uv):
-    """Tangents along growing u, averaged over the triangles of a vertex: near what MikkTSpace gives."""
-    a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
-    ua, ub, uc = (uv[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
-    (du1, dv1), (du2, dv2) = (ub - ua).T, (uc - ua).T
-    area = du1 * dv2 - du2 * dv1
-    along = ((b - a) * dv2[:, None] - (c - a) * dv1[:, None]) * np.sign(area)[:, None]
-    sums, sides = np.zeros_like(mesh.positions, np.float64), np.zeros(len(mesh.positions))
-    for k in range(3):
-        np.add.at(sums, mesh.triangles[:, k], along)
-        np.add.at(sides, mesh.triangles[:, k], area)
-    n = mesh.normals.astype(np.float64)
-    flat = unit(sums - n * np.einsum("vi,vi->v", n, sums)[:, None])
-    # v points down in glTF and the bitangent up: it is cross(n, t) where the image is seen mirrored.
-    return np.hstack([flat, np.where(sides > 0, -1.0, 1.0)[:, None]]).astype(np.float32)

@@ -79,7 +79,7 @@ class Builder:
         result = {"type": "scene", "camera": self.sensor(self.scene.camera(camera), size)}
         for number, material in enumerate(self.scene.materials):
             meshes = [mesh for mesh in self.scene.meshes if mesh.material == number]
-            # Those with uv, tangents or colours apart from those without.
+            # Those with tangents or colours apart from those without.
             kinds = {}
             for mesh in meshes:
                 kinds.setdefault(_kind(mesh), []).append(mesh)
@@ -142,10 +142,13 @@ class Builder:
         for name, values in (("colors", "colors"), ("tangent", "tangents")):
             if getattr(meshes[0], values) is not None:
                 attributes[name] = np.concatenate([getattr(m, values) for m in meshes])
-        uvs = [
-            None if uv is None else np.concatenate([m.uvs[i] for m in meshes])
-            for i, uv in enumerate(meshes[0].uvs)
-        ]
+        sets = {texture.uv_set for texture in material.textures}
+        if len(sets) > 1:
+            raise Unsupported(f"material {material.name!r} uses both uv sets")
+        # Without coordinates all is looked up at (0, 0).
+        zeros = [np.zeros((len(m.positions), 2), np.float32) for m in meshes]
+        uv = [m.uvs[i] if m.uvs[i] is not None else zero for i in sets for m, zero in zip(meshes, zeros)]
+        uv = np.concatenate(uv) if uv else None
         # Mitsuba's lamps shine on the side of the shading normal; ours on that of the triangle.
         if material.is_emissive and not flat:
             attributes["smooth"] = normals
@@ -154,11 +157,12 @@ class Builder:
         if material.is_emissive and material.double_sided:
             copies.append((positions - 1e-5 * self.diagonal * normals, triangles[:, ::-1]))
         for points, corners in copies:
-            bsdf = self.bsdf(material, flat, attributes, uvs)
+            bsdf = self.bsdf(material, flat, attributes)
             emitter = self.emitter(material) if material.is_emissive else None
-            yield _mesh(material.name, points, corners, vertex_normals, uvs[0], attributes, bsdf, emitter)
+            yield _mesh(material.name, points, corners, vertex_normals, uv, attributes, bsdf, emitter)
 
     def emitter(self, material):
+        """The light of an emissive material."""
         if material.emissive_texture is None:
             return mi.load_dict({"type": "area", "radiance": _rgb(material.emissive)})
         return mi.load_dict(
@@ -168,7 +172,7 @@ class Builder:
             }
         )
 
-    def bsdf(self, material, flat, attributes, uvs):
+    def bsdf(self, material, flat, attributes):
         """Mitsuba's `diffuse` where that is the same, else `GltfBsdf`."""
         plain = flat and not attributes and material.is_lambert and material.alpha_mode == "OPAQUE"
         plain &= material.normal_texture is None and material.metallic_roughness_texture is None
@@ -189,9 +193,7 @@ class Builder:
         if material.alpha_mode != "OPAQUE":
             wanted.append(("alpha", material.base_color_texture, "alpha"))
         for name, texture, channels in wanted:
-            if texture is not None and uvs[texture.uv_set] is not None:
-                if texture.uv_set > 0:
-                    raise Unsupported(f"material {material.name!r} uses a second uv set")
+            if texture is not None:
                 maps[name] = mi.load_dict(self.texture(texture, channels))
         for name, attribute in (
             ("smooth", "smooth"),
@@ -240,7 +242,7 @@ class Builder:
 
 def _kind(mesh):
     """What meshes must share to become one."""
-    return tuple(x is not None for x in (*mesh.uvs, mesh.colors, mesh.tangents))
+    return mesh.colors is not None, mesh.tangents is not None
 
 
 def _rgb(value):

@@ -28,7 +28,9 @@ def arguments(description, effort):
     parser.add_argument("--camera", help="name; the file's first by default")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--effort", type=int, required=True, help=effort)
-    parser.add_argument("--denoise", action="store_true", help="Open Image Denoise, guided by albedo and normal")
+    parser.add_argument(
+        "--denoise", action="store_true", help="Open Image Denoise, guided by albedo and normal"
+    )
     parser.add_argument("--seed", type=int, default=0)
     args = parser.parse_args()
     args.width, args.height = map(int, args.size.split("x"))
@@ -88,7 +90,9 @@ def texels(scene, texture, linear):
     """A texture's texels (height × width × 3) in [0, 1], sRGB decoded if `linear`."""
     image = Image.open(io.BytesIO(scene.images[texture.image].data)).convert("RGB")
     values = np.asarray(image, np.float32) / 255
-    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4) if linear else values
+    return (
+        np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4) if linear else values
+    )
 
 
 class Report:
@@ -117,14 +121,14 @@ class Report:
         print(json.dumps(line), flush=True)
 
 
-def write_exr(path, pixels, comments):
-    """Writes `pixels` (height × width × 3, first row on top, cd/m²)."""
+def write_exr(path, pixels, comments, dtype=np.float32):
+    """Writes `pixels` (height × width × 3, first row on top, cd/m²) as numbers of `dtype`."""
     header = {
         "compression": OpenEXR.ZIP_COMPRESSION,
         "type": OpenEXR.scanlineimage,
         "comments": comments,
     }
-    OpenEXR.File(header, {"RGB": np.ascontiguousarray(pixels, np.float32)}).write(str(path))
+    OpenEXR.File(header, {"RGB": np.ascontiguousarray(pixels, dtype)}).write(str(path))
 
 
 def read_exr(path):
