@@ -38,7 +38,8 @@ pub fn names() -> Vec<&'static str> {
 }
 
 /// Runs every step but those named in `without`, from the repository's root, and stops at the first that fails.
-pub fn run(without: &[String]) -> Result<()> {
+/// `browser` adds the one that needs what not every machine has.
+pub fn run(without: &[String], browser: bool) -> Result<()> {
     for step in STEPS.iter().filter(|step| !without.iter().any(|name| name == step.name)) {
         println!("\n== {}", step.command);
         let start = Instant::now();
@@ -52,6 +53,12 @@ pub fn run(without: &[String]) -> Result<()> {
             .with_context(|| format!("starting `{}`", step.command))?;
         ensure!(status.success(), "`{}` failed", step.command);
         println!("== {} took {:.0} s", step.name, start.elapsed().as_secs_f64());
+    }
+    if browser {
+        println!("\n== the page of reference-comparison, in a browser");
+        let start = Instant::now();
+        crate::browser::check()?;
+        println!("== browser took {:.0} s", start.elapsed().as_secs_f64());
     }
     Ok(())
 }

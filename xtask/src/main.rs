@@ -2,6 +2,7 @@
 
 mod base64;
 mod bench_rays;
+mod browser;
 mod check;
 mod comparison;
 #[cfg(test)]
@@ -30,6 +31,9 @@ enum Chore {
         /// Leave out a step
         #[arg(long, value_parser = clap::builder::PossibleValuesParser::new(check::names()))]
         without: Vec<String>,
+        /// Also try the page of `reference-comparison` in a browser; needs node, npm and Chromium
+        #[arg(long)]
+        browser: bool,
     },
     /// Compare speed and error with references and other renderers
     ReferenceComparison(comparison::Args),
@@ -50,7 +54,7 @@ enum Bench {
 fn main() -> Result<()> {
     match Args::parse().chore {
         Chore::Bench(Bench::Rays(args)) => bench_rays::run(args),
-        Chore::Check { without } => check::run(&without),
+        Chore::Check { without, browser } => check::run(&without, browser),
         Chore::ReferenceComparison(args) => comparison::run(args),
         Chore::Scenes { check: false } => scenes::write(&root().join("assets")),
         Chore::Scenes { check: true } => scenes::check(&root().join("assets")),

@@ -1,6 +1,6 @@
 //! An axis whose ticks are 1, 2 or 5 times a power of ten, and whose ends are ticks.
 
-use super::words::number;
+use super::words::short;
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use std::ops::Range;
 
@@ -50,13 +50,14 @@ impl Axis {
 
     /// What is written at a tick.
     pub fn label(&self, tick: f64) -> String {
-        // Two digits tell 1.5 from 2; trailing zeros would tell nothing.
-        let text = number(tick, 2);
-        let text = match text.contains('.') {
-            true => text.trim_end_matches('0').trim_end_matches('.').to_string(),
-            false => text,
+        // Long numbers would run into one another.
+        let (size, unit) = match self.unit {
+            " MB" if tick >= 1e3 => (1e3, " GB"),
+            "" if tick >= 1e6 => (1e6, " M"),
+            "" if tick >= 1e4 => (1e3, " k"),
+            unit => (1.0, unit),
         };
-        format!("{text}{}", self.unit)
+        format!("{}{unit}", short(tick / size))
     }
 }
 
@@ -140,6 +141,13 @@ mod tests {
         assert_eq!(labels(true, &[0.6, 9.0], 9), ["0.5", "1", "2", "5", "10"]);
         assert_eq!(labels(true, &[0.04, 900.0], 9), ["0.01", "0.1", "1", "10", "100", "1000"]);
         assert_eq!(labels(true, &[1.0, 1.1], 9), ["1", "1.5"]);
+    }
+
+    #[test]
+    fn long_numbers_are_told_in_thousands() {
+        assert_eq!(labels(true, &[2e3, 9e5], 7), ["1000", "3000", "10 k", "30 k", "100 k", "300 k", "1 M"]);
+        let memory = Axis::around("", " MB", true, [500.0, 2000.0].into_iter(), 9).unwrap();
+        assert_eq!((memory.label(500.0), memory.label(2000.0)), ("500 MB".into(), "2 GB".into()));
     }
 
     #[test]

@@ -22,9 +22,10 @@ pub struct Named {
 type Box4 = [i32; 4];
 
 /// Writes each name beside the last point of its curve, else beside its first, in the first of a few places where it
-/// lies within `frame` and covers no curve and no other name. All in units of the layer.
-pub fn draw(area: &Area, curves: &[Named], frame: Box4) -> Drawn<()> {
-    let mut taken: Vec<Box4> = curves.iter().flat_map(|c| ink(&c.points)).collect();
+/// lies within `frame` and covers no curve, not `front`, and no other name. All in units of the layer.
+pub fn draw(area: &Area, curves: &[Named], front: &[(i32, i32)], frame: Box4) -> Drawn<()> {
+    let curves_ink = curves.iter().flat_map(|c| ink(&c.points));
+    let mut taken: Vec<Box4> = curves_ink.chain(ink(front)).collect();
     for Named { name, style, points } in curves {
         let (Some(&first), Some(&last)) = (points.first(), points.last()) else { continue };
         let width = px(LETTER * name.chars().count() as f64);

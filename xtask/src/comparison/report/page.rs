@@ -100,7 +100,7 @@ fn overview(results: &Results, parts: &Parts) -> String {
         .map(|(name, value)| format!("<dt>{}</dt><dd>{}</dd>\n", escape(name), escape(value)))
         .collect();
     format!(
-        "<h2>At a glance</h2>\n{glance}<details open><summary>Machine and versions</summary><dl>\n{facts}</dl></details>\n"
+        "<h2>At a glance</h2>\n{glance}<details open><summary>Machine and versions</summary><dl class=\"machine\">\n{facts}</dl></details>\n"
     )
 }
 

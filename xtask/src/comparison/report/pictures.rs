@@ -1,6 +1,6 @@
 //! The pictures of a scene, all shown at the exposure of its reference, and where each of them errs.
 
-use super::front::moment;
+use super::front::{fastest, moment};
 use super::words::{percent, seconds};
 use crate::base64::base64;
 use crate::comparison::results::{Curve, Point, Scene};
@@ -19,7 +19,7 @@ pub const ERROR: f64 = 0.02;
 /// Bytes that all pictures of a page may take before they become text, a third longer.
 const BUDGET: usize = 9_000_000;
 /// Longest side and JPEG quality, best first: the first whose sum fits the budget is taken.
-const SIZES: [(u32, u8); 5] = [(1024, 92), (640, 90), (512, 88), (384, 85), (256, 75)];
+const SIZES: [(u32, u8); 5] = [(1024, 92), (640, 88), (512, 84), (384, 78), (256, 70)];
 
 /// The pictures of one scene.
 pub struct Gallery {
@@ -29,6 +29,8 @@ pub struct Gallery {
     pub moment: Option<f64>,
     /// The reference first, then the methods' in the order of the scene.
     pub pictures: Vec<Picture>,
+    /// Which of them is first laid over the reference.
+    pub first: usize,
     /// What could not be shown, and why.
     pub missing: Vec<String>,
 }
@@ -47,6 +49,13 @@ pub struct Picture {
     errors: Option<RgbImage>,
 }
 
+impl Picture {
+    /// Whether it is what the others are held against.
+    pub fn is_reference(&self) -> bool {
+        self.errors.is_none()
+    }
+}
+
 /// A picture ready for the page.
 pub struct Encoded {
     /// `data:` URI of the picture.
@@ -60,7 +69,8 @@ pub struct Encoded {
 /// Reads the pictures of `scene` that are to be shown: paths from `folder`, the reference's from `root`. Whatever
 /// cannot be read is listed, not fatal: a page without one picture is better than none.
 pub fn read(scene: &Scene, folder: &Path, root: &Path) -> Gallery {
-    let mut gallery = Gallery { exposure: 0.0, moment: moment(scene), pictures: vec![], missing: vec![] };
+    let mut gallery =
+        Gallery { exposure: 0.0, moment: moment(scene), pictures: vec![], first: 1, missing: vec![] };
     let reference = match read_reference(&root.join(&scene.reference.path)) {
         Ok(reference) => reference.mean,
         Err(e) => {
@@ -77,12 +87,16 @@ pub fn read(scene: &Scene, folder: &Path, root: &Path) -> Gallery {
         shown,
         errors: None,
     }));
+    let fastest = fastest(scene, ERROR, |c| c.ours).map(|(curve, _)| &curve.method);
     for curve in &scene.curves {
         let by_time = gallery.moment.and_then(|m| nearest(curve, m, |p| p.seconds));
         let by_error = nearest(curve, ERROR, |p| p.error);
         for (i, point) in curve.points.iter().enumerate() {
             let (at_time, at_error) = (by_time == Some(i), by_error == Some(i));
             let Some(path) = point.picture.as_ref().filter(|_| at_time || at_error) else { continue };
+            if at_time && fastest == Some(&curve.method) {
+                gallery.first = gallery.pictures.len();
+            }
             match one(&folder.join(path), &reference, gallery.exposure) {
                 Ok((shown, errors)) => gallery.pictures.push(Picture {
                     name: curve.label.clone(),

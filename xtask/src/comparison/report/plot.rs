@@ -41,6 +41,13 @@ pub struct Line {
     pub points: Vec<Mark>,
 }
 
+impl Line {
+    /// Height of its row in the legend, pixels.
+    fn row(&self) -> f64 {
+        ROW + if self.remark.is_some() { 14.0 } else { 0.0 }
+    }
+}
+
 /// One point of a line.
 pub struct Mark {
     /// Place on the axes.
@@ -77,23 +84,39 @@ struct Layout {
     legend: (f64, f64),
     /// Letters of a label that find room.
     letters: usize,
+    /// Letters of the title that do, and their size.
+    heading: (usize, f64),
 }
 
 impl Layout {
     fn of(plot: &Plot, form: Form) -> Layout {
-        let rows = plot.lines.len() + usize::from(!plot.front.is_empty());
-        let legend = rows as f64 * ROW;
+        let front = if plot.front.is_empty() { 0.0 } else { ROW };
+        let legend: f64 = plot.lines.iter().map(Line::row).sum::<f64>() + front;
         match form {
             Form::Wide => {
                 let height = (legend + 90.0).max(500.0);
                 let right = 920.0 - BESIDE - 20.0;
-                let frame = [66.0, 66.0, right, height - 58.0];
-                Layout { width: 920.0, height, frame, legend: (right + 26.0, 78.0), letters: 26 }
+                let frame = [72.0, 66.0, right, height - 58.0];
+                Layout {
+                    width: 920.0,
+                    height,
+                    frame,
+                    legend: (right + 26.0, 78.0),
+                    letters: 26,
+                    heading: (85, 17.0),
+                }
             }
             Form::Narrow => {
-                let frame = [52.0, 62.0, 376.0, 350.0];
+                let frame = [66.0, 62.0, 366.0, 350.0];
                 let height = 350.0 + 64.0 + legend;
-                Layout { width: 390.0, height, frame, legend: (20.0, 350.0 + 68.0), letters: 42 }
+                Layout {
+                    width: 390.0,
+                    height,
+                    frame,
+                    legend: (20.0, 350.0 + 68.0),
+                    letters: 42,
+                    heading: (38, 15.0),
+                }
             }
         }
     }
@@ -109,13 +132,17 @@ pub fn draw(plot: &Plot, form: Form) -> Result<String> {
 
     drawing.layer("class=\"panel\"", None, |area| {
         area.draw(&Rectangle::new([(0, 0), area.dim_in_pixel_i32()], PANEL.filled()))?;
-        area.draw_text(&plot.title, &bold(17.0, INK), (px(16.0), px(14.0)))?;
+        let (letters, size) = layout.heading;
+        area.draw_text(&cut(&plot.title, letters), &bold(size, INK), (px(16.0), px(14.0)))?;
         area.draw_text(&plot.y.title, &text(SMALL, GREY), (px(16.0), px(40.0)))?;
         let below = text(SMALL, GREY).pos(Pos::new(HPos::Right, VPos::Bottom));
         area.draw_text(&plot.x.title, &below, (px(right), px(bottom + 46.0)))
     })?;
-    if !plot.front.is_empty() {
-        drawing.layer("class=\"dominated\"", None, |area| front(area, plot, &layout, place))?;
+    let frame = layout.frame.map(px);
+    let corners: Vec<(i32, i32)> = plot.front.iter().map(|&p| place(p)).collect();
+    let steps = steps(&corners, frame);
+    if !steps.is_empty() {
+        drawing.layer("class=\"dominated\"", None, |area| land(area, &steps, frame))?;
     }
     drawing.layer("class=\"grid\"", None, |area| mesh(area, plot, &layout))?;
     for line in &plot.lines {
@@ -127,7 +154,7 @@ pub fn draw(plot: &Plot, form: Form) -> Result<String> {
         points: shown(plot, line).map(|m| place(m.at)).collect(),
     };
     let ends: Vec<Named> = plot.lines.iter().map(named).collect();
-    drawing.layer("class=\"names\"", None, |area| labels::draw(area, &ends, layout.frame.map(px)))?;
+    drawing.layer("class=\"names\"", None, |area| labels::draw(area, &ends, &steps, frame))?;
     drawing.layer("class=\"legend\"", None, |area| legend(area, plot, &layout))?;
     let class = if form == Form::Wide { "chart wide" } else { "chart narrow" };
     Ok(drawing.finish(class, &plot.title))
@@ -159,24 +186,22 @@ fn mesh(area: &Area, plot: &Plot, layout: &Layout) -> Drawn<()> {
         .draw()
 }
 
-/// The grey land behind the front: for every point in it, there is a better one.
-fn front(area: &Area, plot: &Plot, layout: &Layout, place: impl Fn((f64, f64)) -> (i32, i32)) -> Drawn<()> {
-    let [_, top, right, _] = layout.frame.map(px);
-    let corners: Vec<(i32, i32)> = plot.front.iter().map(|&p| place(p)).collect();
-    let (Some(first), Some(last)) = (corners.first().copied(), corners.last().copied()) else {
-        return Ok(());
-    };
-    let mut steps = vec![(first.0, top)];
-    for (i, &(x, y)) in corners.iter().enumerate() {
-        if i > 0 {
-            steps.push((x, corners[i - 1].1));
-        }
-        steps.push((x, y));
+/// Corners of the front as it is drawn: from the top down to its first point, then by steps to the right edge.
+fn steps(front: &[(i32, i32)], [_, top, right, _]: [i32; 4]) -> Vec<(i32, i32)> {
+    let (Some(first), Some(last)) = (front.first(), front.last()) else { return Vec::new() };
+    let mut steps = vec![(first.0, top), *first];
+    for pair in front.windows(2) {
+        steps.extend([(pair[1].0, pair[0].1), pair[1]]);
     }
     steps.push((right, last.1));
+    steps
+}
+
+/// The grey land behind the front: for every point in it, there is a better one.
+fn land(area: &Area, steps: &[(i32, i32)], [_, top, right, _]: [i32; 4]) -> Drawn<()> {
     let land: Vec<(i32, i32)> = steps.iter().copied().chain([(right, top)]).collect();
     area.draw(&Polygon::new(land, DOMINATED.filled()))?;
-    area.draw(&PathElement::new(steps, stroke(1.0, GREY)))
+    area.draw(&PathElement::new(steps.to_vec(), stroke(1.0, GREY)))
 }
 
 /// A line and its points; each point is a group of its own, so that it can say what it is.
@@ -231,15 +256,12 @@ fn legend(area: &Area, plot: &Plot, layout: &Layout) -> Drawn<()> {
             }
         }
         markers::draw(area, &line.style, (px(x + 15.0), px(y)), MARKER + 1.0)?;
-        let (words, raised) = match line.remark {
-            Some(_) => (cut(&line.label, layout.letters), 6.0),
-            None => (cut(&line.label, layout.letters), 0.0),
-        };
-        area.draw_text(&words, &middle(text(SMALL + 1.0, INK)), (px(x + 40.0), px(y - raised)))?;
+        let words = cut(&line.label, layout.letters);
+        area.draw_text(&words, &middle(text(SMALL + 1.0, INK)), (px(x + 40.0), px(y)))?;
         if let Some(remark) = line.remark {
-            area.draw_text(remark, &middle(text(SMALL - 2.0, GREY)), (px(x + 40.0), px(y + 8.0)))?;
+            area.draw_text(remark, &middle(text(SMALL - 2.0, GREY)), (px(x + 40.0), px(y + 15.0)))?;
         }
-        y += ROW;
+        y += line.row();
     }
     if !plot.front.is_empty() {
         let path = [(0.0, -6.0), (14.0, -6.0), (14.0, 6.0), (30.0, 6.0)];

@@ -1,7 +1,7 @@
 //! Where the seconds of each method go: a bar of its stages, as shares of the whole process.
 
 use super::pictures::ERROR;
-use super::words::{escape, percent, seconds};
+use super::words::{escape, percent, seconds, short_percent};
 use crate::comparison::results::{Curve, Point, Scene};
 
 /// Colours of the stages that we know, and of those that we do not.
@@ -32,13 +32,15 @@ pub fn html(scene: &Scene) -> String {
     if rows.is_empty() {
         return String::new();
     }
-    let mut legend: Vec<(&str, &str)> = Vec::new();
+    let mut legend: Vec<(Vec<&str>, &str)> = Vec::new();
     let mut body = String::new();
     for (curve, point, parts) in &rows {
         let mut bar = String::new();
         for part in parts {
-            if !legend.iter().any(|(name, _)| *name == part.name) {
-                legend.push((part.name, part.colour));
+            match legend.iter_mut().find(|(_, colour)| *colour == part.colour) {
+                Some((names, _)) if names.contains(&part.name) => {}
+                Some((names, _)) => names.push(part.name),
+                None => legend.push((vec![part.name], part.colour)),
             }
             bar += &format!(
                 "<i style=\"width:{:.2}%;background:{}\" title=\"{} {}\"></i>",
@@ -57,14 +59,17 @@ pub fn html(scene: &Scene) -> String {
     }
     let legend: String = legend
         .iter()
-        .map(|(name, colour)| {
-            format!("<span><i class=\"swatch\" style=\"background:{colour}\"></i>{}</span> ", escape(name))
+        .map(|(names, colour)| {
+            format!(
+                "<span><i class=\"swatch\" style=\"background:{colour}\"></i>{}</span> ",
+                escape(&names.join(", "))
+            )
         })
         .collect();
     format!(
         "<h3>Where the seconds go</h3>\n<p>Share of each process, at its picture nearest to {}.</p>\n\
          <p class=\"key\">{legend}</p>\n<ul class=\"bars\">\n{body}</ul>\n",
-        percent(ERROR)
+        short_percent(ERROR)
     )
 }
 

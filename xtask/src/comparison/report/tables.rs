@@ -4,7 +4,8 @@ use super::front::{LEVELS, fastest, seconds_to};
 use super::style;
 use super::table::{Cell, Table};
 use super::words::{
-    NONE, count, megabytes, number, percent, percent_with_error, ratio, seconds, signed_percent,
+    NONE, count, megabytes, number, percent, percent_with_error, ratio, seconds, short, short_percent,
+    signed_percent,
 };
 use crate::comparison::results::{Curve, Point, Results, Scene, Sweep};
 
@@ -12,7 +13,7 @@ use crate::comparison::results::{Curve, Point, Results, Scene, Sweep};
 pub fn at_a_glance(results: &Results) -> Table {
     let mut table = Table::new(2, &["scene", "error", "twolight", "fastest other", "other / twolight"]);
     for scene in &results.scenes {
-        for level in [0.02, 0.01] {
+        for level in [0.05, 0.02, 0.01] {
             let side = |ours: bool| fastest(scene, level, |c| c.ours == ours);
             let (ours, other) = (side(true), side(false));
             if ours.is_none() && other.is_none() {
@@ -23,7 +24,7 @@ pub fn at_a_glance(results: &Results) -> Table {
                 None => "not reached".into(),
             };
             let factor = ours.zip(other).map_or(NONE.into(), |(o, x)| ratio(x.1 / o.1));
-            let row = [scene.name.clone(), percent(level), told(ours), told(other), factor];
+            let row = [scene.name.clone(), short_percent(level), told(ours), told(other), factor];
             table.rows.push(row.into_iter().map(Cell::from).collect());
         }
     }
@@ -55,11 +56,6 @@ pub fn seconds_to_levels(scene: &Scene) -> Table {
         table.rows.push(row);
     }
     table
-}
-
-/// 0.5 % rather than 0.50 %.
-fn short_percent(fraction: f64) -> String {
-    format!("{} %", (fraction * 1e4).round() / 100.0)
 }
 
 fn method(curve: &Curve, index: usize) -> Cell {
@@ -105,7 +101,7 @@ pub fn sweep(sweep: &Sweep) -> Table {
         for p in &line.points {
             let row = [
                 line.label.clone(),
-                number(p.x, 4),
+                short(p.x),
                 seconds(p.seconds),
                 seconds(p.prepass_seconds),
                 megabytes(p.peak_mb),
@@ -148,14 +144,15 @@ mod tests {
         let scene = scene(vec![ours, curve("mitsuba", false, &[(4.0, 0.02)]), odd]);
         let table = seconds_to_levels(&scene);
         let row = |i: usize| table.rows[i].iter().map(|c| c.text.replace('\u{a0}', " ")).collect::<Vec<_>>();
-        assert_eq!(table.head, ["method", "to 5 %", "to 2 %", "to 1 %", "to 0.5 %", "smallest error"]);
+        let head: Vec<String> = table.head.iter().map(|h| h.replace('\u{a0}', " ")).collect();
+        assert_eq!(head, ["method", "to 5 %", "to 2 %", "to 1 %", "to 0.5 %", "smallest error"]);
         assert_eq!(row(0), ["split", "1.0 s (× 1.0)", "2.5 s (× 1.0)", "–", "–", "1.2 % at 4.0 s"]);
         assert_eq!(row(1), ["mitsuba", "4.0 s (× 4.0)", "4.0 s (× 1.6)", "–", "–", "2.0 % at 4.0 s"]);
         assert_eq!(row(2)[0..4], ["odd †", "0.10 s", "0.10 s", "0.10 s"]);
         assert!(table.rows[0][1].best && !table.rows[2][1].best);
         let glance = at_a_glance(&Results { scenes: vec![scene], ..Results::default() });
-        assert_eq!(glance.rows.len(), 1);
-        assert_eq!(glance.rows[0][4].text, "×\u{a0}1.6");
+        assert_eq!(glance.rows.len(), 2);
+        assert_eq!(glance.rows[1][4].text, "×\u{a0}1.6");
     }
 
     #[test]

@@ -1,11 +1,11 @@
 //! The pictures of a scene on the page: a strip of all, and a stage on which any two are laid over one another.
 
 use super::pictures::{ERROR, Encoded, Gallery, Picture};
-use super::words::{escape, number, percent, seconds};
+use super::words::{escape, number, seconds, short_percent};
 use raytrace::difference::{SCALE, false_colour};
 
 /// Width at which small pictures are shown, pixels, at most: pixels are repeated a whole number of times.
-const STAGE: u32 = 640;
+const STAGE: u32 = 800;
 
 /// The pictures of one scene; says why if there are none. `embedded` holds the files of `gallery.pictures`.
 pub fn html(gallery: &Gallery, embedded: &[Encoded]) -> String {
@@ -23,13 +23,18 @@ pub fn html(gallery: &Gallery, embedded: &[Encoded]) -> String {
          Below each: where it errs.</p>\n",
         number(f64::from(gallery.exposure), 3),
         gallery.moment.map(|m| format!("{} and the one nearest to ", seconds(m))).unwrap_or_default(),
-        percent(ERROR) + "."
+        short_percent(ERROR) + "."
     );
-    format!("<h3>Pictures</h3>\n{intro}{}{}{}{missing}", stage(&pictures), scale(), strip(gallery, &pictures))
+    format!(
+        "<h3>Pictures</h3>\n{intro}{}{}{}{missing}",
+        stage(gallery, &pictures),
+        scale(),
+        strip(gallery, &pictures)
+    )
 }
 
 /// Two pictures over one another; the script fills it from the strip.
-fn stage(pictures: &[(&Picture, &Encoded)]) -> String {
+fn stage(gallery: &Gallery, pictures: &[(&Picture, &Encoded)]) -> String {
     let (width, height) = pictures[0].1.size;
     let shown = width * (STAGE / width.max(1)).clamp(1, 8);
     let options = |chosen: usize| -> String {
@@ -41,7 +46,7 @@ fn stage(pictures: &[(&Picture, &Encoded)]) -> String {
     };
     let mut text = include_str!("viewer.html").to_string();
     for (name, value) in [
-        ("{left}", options(1)),
+        ("{left}", options(gallery.first.min(pictures.len() - 1))),
         ("{right}", options(0)),
         ("{width}", shown.to_string()),
         ("{columns}", width.to_string()),
@@ -53,7 +58,7 @@ fn stage(pictures: &[(&Picture, &Encoded)]) -> String {
 }
 
 fn title(picture: &Picture) -> String {
-    match picture.caption.is_empty() {
+    match picture.is_reference() || picture.caption.is_empty() {
         true => picture.name.clone(),
         false => format!("{} · {}", picture.name, picture.caption),
     }
@@ -89,13 +94,17 @@ fn strip(gallery: &Gallery, pictures: &[(&Picture, &Encoded)]) -> String {
     };
     let shot = |(i, (p, e)): (usize, &(&Picture, &Encoded))| {
         let name = escape(&p.name);
-        let badges = match p.errors_exist(e) {
-            true => badge(p.at_time, gallery.moment.map(seconds)) + &badge(p.at_error, Some(percent(ERROR))),
-            false => String::new(),
+        // The reference stands for every time and error, and needs no badge to say so.
+        let badges = match p.is_reference() {
+            true => String::new(),
+            false => {
+                badge(p.at_time, gallery.moment.map(seconds)) + &badge(p.at_error, Some(short_percent(ERROR)))
+            }
         };
-        let errors = e.errors.as_ref().map(|uri| {
-            format!("<img class=\"errors\" src=\"{uri}\" alt=\"error map of {name}\" loading=\"lazy\">")
-        });
+        let errors = e
+            .errors
+            .as_ref()
+            .map(|uri| format!("<img class=\"errors\" src=\"{uri}\" alt=\"error map of {name}\">"));
         format!(
             "<figure class=\"shot\" data-index=\"{i}\"><button type=\"button\" title=\"Put it on the stage\">\
              <img class=\"shown\" src=\"{}\" alt=\"{name}\">{}</button>\
@@ -109,11 +118,4 @@ fn strip(gallery: &Gallery, pictures: &[(&Picture, &Encoded)]) -> String {
     };
     let shots: String = pictures.iter().enumerate().map(shot).collect();
     format!("<div class=\"strip\">\n{shots}</div>\n")
-}
-
-impl Picture {
-    /// The reference stands for every time and error, and needs no badge to say so.
-    fn errors_exist(&self, embedded: &Encoded) -> bool {
-        embedded.errors.is_some()
-    }
 }

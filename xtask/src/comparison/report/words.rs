@@ -105,6 +105,20 @@ pub fn percent_with_error(fraction: f64, error: Option<f64>) -> String {
     format!("{value:.decimals$} ± {error:.decimals$}{BOUND}%")
 }
 
+/// A round fraction as percent, without needless zeros: 0.005 is 0.5 %.
+pub fn short_percent(fraction: f64) -> String {
+    format!("{}{BOUND}%", short(100.0 * fraction))
+}
+
+/// Up to four digits that count, without zeros behind the point.
+pub fn short(value: f64) -> String {
+    let text = number(value, 4);
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').into(),
+        false => text,
+    }
+}
+
 /// Seconds of a clock.
 pub fn seconds(s: f64) -> String {
     with_unit(s, if s < 100.0 { 2 } else { 3 }, "s")
@@ -129,7 +143,7 @@ pub fn count(n: u64) -> String {
     let units = [(1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k")];
     match units.iter().find(|(size, _)| n >= 10.0 * size) {
         Some((size, unit)) => format!("{}{BOUND}{unit}", number(n / size, 3)),
-        None => number(n, 4),
+        None => number(n, 0),
     }
 }
 
@@ -164,6 +178,10 @@ mod tests {
         assert_eq!(percent_with_error(0.02314, None), "2.3\u{a0}%");
         assert_eq!(percent_with_error(f64::NAN, Some(0.1)), NONE);
         assert_eq!(percent_with_error(0.5, Some(0.0)), "50\u{a0}%");
+        assert_eq!(
+            (short_percent(0.005), short(0.3), short(1e6)),
+            ("0.5\u{a0}%".into(), "0.3".into(), "1\u{202f}000\u{202f}000".into())
+        );
         assert_eq!(signed_percent(0.012), "+1.2\u{a0}%");
         assert_eq!(signed_percent(-0.012), "−1.2\u{a0}%");
     }
@@ -171,6 +189,7 @@ mod tests {
     #[test]
     fn counts_have_a_unit() {
         assert_eq!(count(0), "0");
+        assert_eq!(count(34), "34");
         assert_eq!(count(9999), "9999");
         assert_eq!(count(12_345), "12.3\u{a0}k");
         assert_eq!(count(2_500_000), "2500\u{a0}k");
