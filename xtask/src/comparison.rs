@@ -16,12 +16,14 @@ mod quick;
 pub mod report;
 pub mod results;
 mod sanity;
+mod scaling;
 mod scene;
 
 use anyhow::{Context, Result, ensure};
 use anywhere::Making;
 use climb::Climber;
 use method::Method;
+pub use process::{Measured, measured};
 use results::{Results, Scene};
 use scene::Subject;
 use std::collections::{BTreeMap, BTreeSet};
@@ -35,6 +37,7 @@ Examples:
   cargo xtask reference-comparison                             all of it, under an hour on two cores
   cargo xtask reference-comparison --only cornell-box --peers none --longest 5
   cargo xtask reference-comparison --quick                     is this state worse than the last?
+  cargo xtask reference-comparison --keep --methods none --peers none --scaling
   cargo xtask reference-comparison --scenes my-rooms --reference-seconds 120
   cargo xtask reference-comparison --report                    the page once more, from results.json
 
@@ -69,6 +72,10 @@ pub struct Args {
     /// A method whose run took longer than this climbs its ladder of settings no further
     #[arg(long, value_name = "SECONDS", default_value_t = 20.0)]
     longest: f64,
+    /// Also measure how time, memory and error grow with triangles, lamps, albedo, pixels, threads, views and the
+    /// error asked
+    #[arg(long, conflicts_with_all = ["quick", "baseline", "report", "scenes"])]
+    scaling: bool,
     /// Keep what results.json in --out already holds, but for the curves measured now
     #[arg(long)]
     keep: bool,
@@ -116,10 +123,21 @@ pub fn run(args: Args) -> Result<()> {
         absent: BTreeSet::new(),
         versions: BTreeMap::new(),
     };
-    for subject in subjects(&args)? {
-        climber.climb(&subject, &methods, |scene, versions| {
+    let subjects = subjects(&args)?;
+    for subject in subjects.iter().filter(|_| !methods.is_empty()) {
+        climber.climb(subject, &methods, |scene, versions| {
             results.versions.extend(versions.clone());
             put(&mut results.scenes, scene);
+            results.write(&file)
+        })?;
+    }
+    if args.scaling {
+        let settings = scaling::Settings { threads, longest: args.longest, out: &out, known: &subjects };
+        scaling::run(&settings, |sweep| {
+            match results.scaling.iter_mut().find(|old| old.name == sweep.name) {
+                Some(old) => *old = sweep.clone(),
+                None => results.scaling.push(sweep.clone()),
+            }
             results.write(&file)
         })?;
     }

@@ -37,6 +37,9 @@ enum Chore {
     },
     /// Compare speed and error with references and other renderers
     ReferenceComparison(comparison::Args),
+    /// Run a program and write down its time and memory: for `reference-comparison`
+    #[command(hide = true)]
+    Measured(comparison::Measured),
     /// Write the scenes that a function describes into assets/
     Scenes {
         /// Write nothing; fail if a file in assets/ differs from what its function gives
@@ -56,6 +59,7 @@ fn main() -> Result<()> {
         Chore::Bench(Bench::Rays(args)) => bench_rays::run(args),
         Chore::Check { without, browser } => check::run(&without, browser),
         Chore::ReferenceComparison(args) => comparison::run(args),
+        Chore::Measured(args) => comparison::measured(args),
         Chore::Scenes { check: false } => scenes::write(&root().join("assets")),
         Chore::Scenes { check: true } => scenes::check(&root().join("assets")),
     }

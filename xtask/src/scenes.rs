@@ -3,14 +3,14 @@
 //! Running this twice, or on another machine, gives the same bytes: positions and texels are computed in f64 and
 //! rounded once, so that a last-bit difference between two sine functions does not reach the file.
 
-mod cornell;
-mod document;
-mod furnace;
+pub mod cornell;
+pub mod document;
+pub mod furnace;
 mod gallery;
-mod material;
+pub mod material;
 mod paint;
 mod round;
-mod shapes;
+pub mod shapes;
 mod two_rooms;
 mod wall;
 

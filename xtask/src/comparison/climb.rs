@@ -4,16 +4,11 @@ use super::measure::{self, Outcome, Told};
 use super::method::{Method, Program, Shot};
 use super::results::{Curve, Scene};
 use super::sanity;
-use super::scene::Subject;
+use super::scene::{Subject, is_black};
 use anyhow::Result;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-
-/// A run shorter than this is done [`TIMES`] times, and the median taken: what the system does beside it weighs more.
-const SHORT: f64 = 2.0;
-/// How often a short run is done in all.
-const TIMES: usize = 3;
 
 /// How to climb, and what was learnt on the way.
 pub struct Climber<'a> {
@@ -61,7 +56,7 @@ impl Climber<'_> {
             self.repeat(subject, methods, step, &mut rendered)?;
             for (i, runs) in rendered {
                 if let Some(point) = scene.curves[i].points.last_mut() {
-                    let told = median(runs);
+                    let told = measure::median(runs);
                     (point.seconds, point.stages, point.peak_mb) = (told.seconds, told.stages, told.peak_mb);
                 }
             }
@@ -70,6 +65,10 @@ impl Climber<'_> {
         scene.curves.retain(|curve| !(curve.points.is_empty() && curve.notes.is_empty()));
         let truth = subject.truth()?;
         for curve in &mut scene.curves {
+            if is_black(&truth) {
+                let note = "the reference is black: 1 % of error or bias stands for 0.01 cd/m² of light where none is";
+                curve.notes.push(note.into());
+            }
             sanity::judge(curve, &truth, self.out)?;
         }
         save(&scene, &self.versions)?;
@@ -143,8 +142,8 @@ impl Climber<'_> {
         rendered: &mut [(usize, Vec<Told>)],
     ) -> Result<()> {
         let spare = self.out.join("pictures/again.exr");
-        for _ in 1..TIMES {
-            for (i, runs) in rendered.iter_mut().filter(|(_, runs)| runs[0].seconds < SHORT) {
+        for _ in 1..measure::TIMES {
+            for (i, runs) in rendered.iter_mut().filter(|(_, runs)| runs[0].seconds < measure::SHORT) {
                 if let Outcome::Done(told) = self.render(subject, &methods[*i], step, &spare)? {
                     runs.push(told);
                 }
@@ -172,24 +171,5 @@ fn curve(method: &Method) -> Curve {
         ours: method.program == Program::Twolight,
         comparable: true,
         ..Curve::default()
-    }
-}
-
-/// The run whose time is the median, with the largest memory of all.
-fn median(mut runs: Vec<Told>) -> Told {
-    let peak_mb = runs.iter().map(|told| told.peak_mb).fold(0.0, f64::max);
-    runs.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
-    Told { peak_mb, ..runs.swap_remove(runs.len() / 2) }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_run_in_the_middle_counts() {
-        let run = |seconds, peak_mb| Told { seconds, peak_mb, ..Told::default() };
-        let told = median(vec![run(3.0, 10.0), run(1.0, 12.0), run(2.0, 11.0)]);
-        assert_eq!((told.seconds, told.peak_mb), (2.0, 12.0));
     }
 }

@@ -69,6 +69,11 @@ const NOT_INSTALLED: i32 = 3;
 /// Exit status of a peer's script that cannot render this scene.
 const BEYOND_IT: i32 = 4;
 
+/// A run shorter than this is done [`TIMES`] times, and the median taken: what the system does beside it weighs more.
+pub const SHORT: f64 = 2.0;
+/// How often a short run is done in all.
+pub const TIMES: usize = 3;
+
 /// Renders one picture; ends the renderer after `limit`.
 pub fn render(program: Program, rung: &Rung, shot: Shot, limit: Duration) -> Result<Outcome> {
     if let Program::Peer(name) = program
@@ -80,7 +85,7 @@ pub fn render(program: Program, rung: &Rung, shot: Shot, limit: Duration) -> Res
         // Or a renderer that writes nothing would be measured by an older picture.
         std::fs::remove_file(shot.out).with_context(|| format!("removing {}", shot.out.display()))?;
     }
-    let ran = match process::run(&mut program.command(&rung.args, shot), limit) {
+    let ran = match process::run(&program.command(&rung.args, shot), limit) {
         Ok(ran) => ran,
         // No Python where the peers' should be: as good as not installed.
         Err(error) if program != Program::Twolight => return Ok(Outcome::Absent(format!("{error:#}"))),
@@ -128,6 +133,13 @@ fn told(program: Program, ran: &Ran) -> Result<Told> {
         }
     }
     Ok(told)
+}
+
+/// The run whose time is the median, with the largest memory of all.
+pub fn median(mut runs: Vec<Told>) -> Told {
+    let peak_mb = runs.iter().map(|told| told.peak_mb).fold(0.0, f64::max);
+    runs.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
+    Told { peak_mb, ..runs.swap_remove(runs.len() / 2) }
 }
 
 /// The point of a picture on its curve, without setting and path; an error where the picture is of another size or
@@ -199,5 +211,12 @@ mod tests {
         let truth = Reference { mean: image(0.0), halves: None };
         let found = point(&Told::default(), &image(2.0), &truth).unwrap();
         assert!((found.bias - 1.0).abs() < 1e-6 && (found.error - 2f64.sqrt()).abs() < 1e-6, "{found:?}");
+    }
+
+    #[test]
+    fn the_run_in_the_middle_counts() {
+        let run = |seconds, peak_mb| Told { seconds, peak_mb, ..Told::default() };
+        let told = median(vec![run(3.0, 10.0), run(1.0, 12.0), run(2.0, 11.0)]);
+        assert_eq!((told.seconds, told.peak_mb), (2.0, 12.0));
     }
 }

@@ -76,7 +76,7 @@ pub fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     entries.map(|entry| Ok(entry?.path())).collect()
 }
 
-/// What `twolight inspect` says of `file`: a process of its own, so that a large scene leaves our memory alone.
+/// What `twolight inspect` says of `file`.
 pub fn inspect(file: &Path) -> Result<Inspected> {
     let mut command = Command::new(crate::root().join("target/release/twolight"));
     let ran = process::run(command.arg("inspect").arg(file).arg("--json"), Duration::from_secs(600))?;
@@ -106,7 +106,7 @@ impl Subject {
         })
     }
 
-    /// The reference, from disk each time: see [`process::Ran::peak_mb`].
+    /// The reference.
     pub fn truth(&self) -> Result<Reference> {
         read(&self.reference.path)
     }

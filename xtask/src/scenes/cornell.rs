@@ -24,7 +24,11 @@ const LIGHT: [f64; 3] = [16750.0, 8777.0, 2241.0];
 
 /// The room with its two blocks.
 pub fn cornell_box() -> Document {
-    let mut doc = Document::default();
+    cornell_box_in(Document::default())
+}
+
+/// The same, added to a document that may subdivide it.
+pub fn cornell_box_in(mut doc: Document) -> Document {
     let white = room(&mut doc);
     let short = [[130.0, 165.0, 65.0], [82.0, 165.0, 225.0], [240.0, 165.0, 272.0], [290.0, 165.0, 114.0]];
     let tall = [[423.0, 330.0, 247.0], [265.0, 330.0, 296.0], [314.0, 330.0, 456.0], [472.0, 330.0, 406.0]];
@@ -35,7 +39,11 @@ pub fn cornell_box() -> Document {
 
 /// The room with a perfect mirror and solid glass: what radiosity alone cannot show.
 pub fn cornell_specular() -> Document {
-    let mut doc = Document::default();
+    cornell_specular_in(Document::default())
+}
+
+/// The same, added to a document that may subdivide it.
+pub fn cornell_specular_in(mut doc: Document) -> Document {
     room(&mut doc);
     let mirror = doc.material(&Material::metal("mirror", [0.95; 3], 0.0));
     let clear = Volume { thickness: 0.2, attenuation_color: [1.0; 3], attenuation_distance: None };

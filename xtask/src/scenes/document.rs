@@ -25,6 +25,7 @@ pub struct Document {
     buffer: Vec<u8>,
     extensions: BTreeSet<&'static str>,
     triangles: usize,
+    splits: u32,
 }
 
 /// glTF's names for numbers.
@@ -35,6 +36,11 @@ const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
 impl Document {
+    /// A document that splits each triangle of the shapes added to it into four, `splits` times.
+    pub fn split(splits: u32) -> Document {
+        Document { splits, ..Document::default() }
+    }
+
     /// Adds a material.
     pub fn material(&mut self, material: &Material) -> MaterialId {
         let json = material.json(|name| {
@@ -54,6 +60,7 @@ impl Document {
 
     /// Adds `shape`, whose coordinates are world space, as one node with one mesh.
     pub fn add(&mut self, name: &str, shape: &Shape, material: MaterialId) {
+        let shape = (0..self.splits).fold(shape.clone(), |shape, _| shape.split());
         let vec3 = |v: &[DVec3]| v.iter().map(|v| v.as_vec3().to_array().to_vec()).collect::<Vec<_>>();
         let mut attributes = json!({
             "POSITION": self.floats("VEC3", &vec3(&shape.positions), true),

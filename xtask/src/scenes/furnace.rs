@@ -10,8 +10,13 @@ use glam::DVec3;
 
 /// One reflectance, one emission: L = L_e / (1 − ρ) = 0.5 / (1 − 0.5).
 pub fn furnace() -> Document {
+    furnace_of(0.5)
+}
+
+/// The same for any reflectance below 1, in steps of 0.01.
+pub fn furnace_of(rho: f64) -> Document {
     let names = ["floor", "ceiling", "left", "right", "back", "front", "ball", "block"];
-    build(names.map(|name| (name, [0.5; 3])))
+    build(names.map(|name| (name, [rho; 3])))
 }
 
 /// Each surface with a colour of its own, and the emission that makes up for what it absorbs.

@@ -66,20 +66,10 @@ impl Shape {
         let mut points: Vec<DVec3> = points.into_iter().map(DVec3::normalize).collect();
         let mut triangles = icosahedron(&points);
         for _ in 0..level {
-            let mut middles = HashMap::new();
-            let mut split = |a: u32, b: u32| {
-                *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
-                    points.push((points[a as usize] + points[b as usize]).normalize());
-                    points.len() as u32 - 1
-                })
-            };
-            triangles = triangles
-                .iter()
-                .flat_map(|&[a, b, c]| {
-                    let (ab, bc, ca) = (split(a, b), split(b, c), split(c, a));
-                    [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
-                })
-                .collect();
+            triangles = in_four(&triangles, |a, b| {
+                points.push((points[a as usize] + points[b as usize]).normalize());
+                points.len() as u32 - 1
+            });
         }
         Shape {
             positions: points.iter().map(|&n| centre + radius * n).collect(),
@@ -97,6 +87,20 @@ impl Shape {
         self.normals.extend(&other.normals);
         self.uvs.extend(&other.uvs);
         self.triangles.extend(other.triangles.iter().map(|t| t.map(|i| first + i)));
+        self
+    }
+
+    /// Each triangle as four in its own plane: the same surface, normals and images.
+    pub fn split(mut self) -> Shape {
+        self.triangles = in_four(&std::mem::take(&mut self.triangles), |a, b| {
+            let (a, b) = (a as usize, b as usize);
+            self.positions.push(0.5 * (self.positions[a] + self.positions[b]));
+            self.normals.push((self.normals[a] + self.normals[b]).normalize());
+            if !self.uvs.is_empty() {
+                self.uvs.push(0.5 * (self.uvs[a] + self.uvs[b]));
+            }
+            self.positions.len() as u32 - 1
+        });
         self
     }
 
@@ -156,6 +160,17 @@ impl Shape {
     }
 }
 
+/// Each triangle as four; `middle` makes the vertex between two others, once for each edge.
+fn in_four(triangles: &[[u32; 3]], mut middle: impl FnMut(u32, u32) -> u32) -> Vec<[u32; 3]> {
+    let mut middles = HashMap::new();
+    let mut split = |a: u32, b: u32| *middles.entry((a.min(b), a.max(b))).or_insert_with(|| middle(a, b));
+    let four = |&[a, b, c]: &[u32; 3]| {
+        let (ab, bc, ca) = (split(a, b), split(b, c), split(c, a));
+        [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+    };
+    triangles.iter().flat_map(four).collect()
+}
+
 /// The twenty faces over twelve corners on the unit sphere: every three that are neighbours of one another.
 fn icosahedron(points: &[DVec3]) -> Vec<[u32; 3]> {
     // cos of the angle between neighbours is 1/√5 = 0.447; the next corners lie at −0.447.
@@ -196,6 +211,15 @@ mod tests {
         // The chords lie inside: 5120 of them miss about half a per cent of the volume.
         let ratio = shape.volume() / (4.0 / 3.0 * PI * 0.125);
         assert!((0.99..1.0).contains(&ratio), "{ratio}");
+    }
+
+    #[test]
+    fn a_split_shape_is_the_same_shape() {
+        let whole = Shape::cuboid(DVec3::ZERO, DVec3::ONE).pictured();
+        let split = whole.clone().split().split();
+        assert_eq!(split.triangles.len(), 16 * whole.triangles.len());
+        assert_eq!((split.positions.len(), split.normals.len()), (split.uvs.len(), split.uvs.len()));
+        assert!((split.volume() - 1.0).abs() < 1e-12);
     }
 
     #[test]
