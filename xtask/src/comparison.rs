@@ -41,8 +41,8 @@ Examples:
   cargo xtask reference-comparison --scenes my-rooms --reference-seconds 120
   cargo xtask reference-comparison --report                    the page once more, from results.json
 
-Without --peers, every other renderer that is installed takes part; the scripts in xtask/peers say how to install
-them, and none is needed. Open index.html in the folder of --out.")]
+Every other renderer that is installed takes part unless --peers says otherwise. None is needed;
+the scripts in xtask/peers say how to install them. The page is index.html in the folder of --out.")]
 pub struct Args {
     /// Is this state worse than the last? Our errors beside assets/reference/baseline.json, in under two minutes;
     /// fails, naming scenes and numbers, if one rose by more than noise
@@ -70,7 +70,7 @@ pub struct Args {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
     threads: Option<u32>,
     /// A method whose run took longer than this climbs its ladder of settings no further
-    #[arg(long, value_name = "SECONDS", default_value_t = 20.0)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 12.0)]
     longest: f64,
     /// Also measure how time, memory and error grow with triangles, lamps, albedo, pixels, threads, views and the
     /// error asked
@@ -107,13 +107,12 @@ pub fn run(args: Args) -> Result<()> {
     std::fs::create_dir_all(&out).with_context(|| format!("making {}", out.display()))?;
 
     let before = if args.keep && file.is_file() { Results::read(&file)? } else { Results::default() };
-    let mut results = Results {
-        commit: machine::commit(),
-        date: machine::date(),
-        machine: machine::machine(),
-        threads,
-        ..before
-    };
+    let commit = machine::commit();
+    if !before.commit.is_empty() && before.commit != commit {
+        println!("note: what is kept was measured at commit {}, not at {commit}", before.commit);
+    }
+    let mut results =
+        Results { commit, date: machine::date(), machine: machine::machine(), threads, ..before };
     results.versions.insert("twolight".into(), format!("{} ({})", env!("CARGO_PKG_VERSION"), results.commit));
 
     let mut climber = Climber {
@@ -186,15 +185,55 @@ fn build() -> Result<()> {
 
 /// Puts what was measured of a scene into the results: its curves replace those of the same method.
 fn put(scenes: &mut Vec<Scene>, measured: &Scene) {
-    let Some(scene) = scenes.iter_mut().find(|scene| scene.name == measured.name) else {
-        return scenes.push(measured.clone());
-    };
+    if !scenes.iter().any(|scene| scene.name == measured.name) {
+        scenes.push(Scene { curves: Vec::new(), ..measured.clone() });
+    }
+    let Some(scene) = scenes.iter_mut().find(|scene| scene.name == measured.name) else { return };
     let mut curves = std::mem::take(&mut scene.curves);
-    for curve in &measured.curves {
+    // A renderer that is not installed, or whose turn has not come, has neither.
+    for curve in measured.curves.iter().filter(|curve| !(curve.points.is_empty() && curve.notes.is_empty())) {
         match curves.iter_mut().find(|old| old.method == curve.method) {
             Some(old) => *old = curve.clone(),
             None => curves.push(curve.clone()),
         }
     }
     *scene = Scene { curves, ..measured.clone() };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use results::{Curve, Point};
+
+    fn scene(curves: &[(&str, usize)]) -> Scene {
+        let curve = |&(method, points): &(&str, usize)| Curve {
+            method: method.into(),
+            points: vec![Point::default(); points],
+            ..Curve::default()
+        };
+        Scene { name: "room".into(), curves: curves.iter().map(curve).collect(), ..Scene::default() }
+    }
+
+    #[test]
+    fn what_was_measured_replaces_what_was_known() {
+        let mut scenes = vec![scene(&[("split", 1), ("path", 2)])];
+        put(&mut scenes, &scene(&[("split", 3), ("path", 0), ("mitsuba", 4)]));
+        let found: Vec<_> = scenes[0].curves.iter().map(|c| (c.method.as_str(), c.points.len())).collect();
+        assert_eq!(found, [("split", 3), ("path", 2), ("mitsuba", 4)]);
+        put(&mut scenes, &Scene { name: "hall".into(), ..Scene::default() });
+        assert_eq!(scenes.len(), 2);
+    }
+
+    #[test]
+    fn methods_are_chosen_by_name() {
+        let keys = |asked: &[&str]| -> Vec<&str> {
+            let asked: Vec<String> = asked.iter().map(|s| s.to_string()).collect();
+            chosen(method::ours(), &asked).unwrap().iter().map(|m| m.key).collect()
+        };
+        assert_eq!(keys(&["all"]).len(), method::ours().len());
+        assert_eq!(keys(&["path", "split"]), ["split", "path"]);
+        assert!(keys(&["none"]).is_empty());
+        let error = chosen(peer::all(), &["blender".into()]).unwrap_err().to_string();
+        assert!(error.contains("blender") && error.contains("cycles"), "{error}");
+    }
 }
