@@ -106,7 +106,7 @@ fn a_tree_too_deep_is_halved_and_gives_the_same_hits() {
         let halved = Bvh {
             tree: wide::fold_to(&mesh, binary, level),
             tracer: deep.tracer,
-            count: super::super::Count::default(),
+            count: Count::default(),
         };
         let random = &mut Random(7);
         for _ in 0..3000 {
