@@ -6,6 +6,7 @@ use crate::transport::Row;
 use geometry::math::offset_origin;
 use geometry::{Ray, Rgb, World};
 use rayon::prelude::*;
+use std::collections::HashMap;
 
 /// One side of one vertex where rays were gathered.
 #[derive(Clone, Debug)]
@@ -27,6 +28,8 @@ enum Source {
     Site(u32),
     /// Interpolated from sites near by; weights sum to 1, unused ones are 0.
     Near([u32; 4], [f32; 4]),
+    /// In the middle of an edge that promised no change on this side: the mean of the slots at its ends.
+    Between(usize, usize),
 }
 
 /// Sites, and how every vertex draws on them.
@@ -35,6 +38,8 @@ pub struct Field {
     /// In the order in which they were gathered.
     pub sites: Vec<Site>,
     sources: Vec<Source>,
+    /// The ends of the edge in whose middle a vertex was put, for those that came by refinement.
+    parents: HashMap<VertexId, [VertexId; 2]>,
 }
 
 /// A site most of whose rays first meet a dead side is buried in an object.
@@ -51,16 +56,28 @@ impl Field {
         self.sources.len()
     }
 
+    /// Remembers that `vertex` was put in the middle of the edge between `ends`.
+    pub fn put_between(&mut self, vertex: VertexId, ends: [VertexId; 2]) {
+        self.parents.insert(vertex, ends);
+    }
+
     /// From a value at each site to a value at each slot.
     pub fn spread(&self, e: &[Rgb]) -> Vec<Rgb> {
         let value = |source: &Source| match source {
-            Source::Nothing => Rgb::BLACK,
+            Source::Nothing | Source::Between(..) => Rgb::BLACK,
             Source::Site(i) => e[*i as usize],
             Source::Near(sites, weights) => {
                 sites.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(&i, &w)| e[i as usize] * w).sum()
             }
         };
-        self.sources.par_iter().map(value).collect()
+        let mut values: Vec<Rgb> = self.sources.par_iter().map(value).collect();
+        // The ends of an edge are older than its middle, so they have their values by now.
+        for (slot, source) in self.sources.iter().enumerate() {
+            if let Source::Between(a, b) = *source {
+                values[slot] = (values[a] + values[b]) * 0.5;
+            }
+        }
+        values
     }
 
     /// Estimated variance of a slot's value (mean of the channels) from the rays that were gathered, lx².
@@ -71,6 +88,7 @@ impl Field {
             Source::Near(sites, weights) => {
                 sites.iter().zip(weights).map(|(&i, w)| w * w * self.sites[i as usize].row.variance).sum()
             }
+            Source::Between(a, b) => 0.25 * (self.variance(*a) + self.variance(*b)),
         }
     }
 
@@ -101,12 +119,25 @@ impl Field {
             .map(|s| {
                 let (v, side) = ((s / 2) as VertexId, Side::BOTH[s % 2]);
                 match site_of[s] {
+                    u32::MAX if self.parents.contains_key(&v) => Source::Nothing, // see below
                     u32::MAX => near(world, vertices, &grids[s % 2], &site_of, v, side),
                     i if sites[i as usize].row.dead > BURIED => Source::Nothing,
                     i => Source::Site(i),
                 }
             })
             .collect();
+        for s in 0..self.sources.len() {
+            let Some(ends) = self.parents.get(&((s / 2) as VertexId)) else { continue };
+            if site_of[s] == u32::MAX {
+                let [a, b] = ends.map(|v| 2 * v as usize + s % 2);
+                self.sources[s] = match (self.usable(a), self.usable(b)) {
+                    (true, true) => Source::Between(a, b),
+                    (true, false) => Source::Between(a, a),
+                    (false, true) => Source::Between(b, b),
+                    (false, false) => Source::Nothing,
+                };
+            }
+        }
     }
 }
 

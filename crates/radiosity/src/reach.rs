@@ -20,25 +20,41 @@ const LONGEST: usize = 10;
 /// A side is lit when one walk in so many comes to a lit place: fewer come through the cracks between a room's walls
 /// (0.65 % outside the measured Cornell box).
 const RARE: usize = 300;
+/// An emitter shines on a side when it does on one point in so many of it.
+const SELDOM: usize = 50;
 
 /// Which sides light reaches.
 #[derive(Clone, Debug)]
 pub struct Reach {
     /// For each piece, front and back.
-    alive: Vec<[bool; 2]>,
+    sides: Vec<[Lit; 2]>,
+}
+
+/// What walks from one side of a piece found.
+#[derive(Clone, Copy, Debug, Default)]
+struct Lit {
+    /// Light comes here.
+    at_all: bool,
+    /// It comes straight from an emitter to a good part of it.
+    directly: bool,
 }
 
 impl Reach {
     /// Whether light can come to `side` of the piece numbered `piece`.
     pub fn alive(&self, piece: u32, side: Side) -> bool {
-        self.alive[piece as usize][side.index()]
+        self.sides[piece as usize][side.index()].at_all
+    }
+
+    /// Whether an emitter shines straight on a good part of `side` of the piece numbered `piece`.
+    pub fn shone_on(&self, piece: u32, side: Side) -> bool {
+        self.sides[piece as usize][side.index()].directly
     }
 
     /// Walks from every side and looks whether it comes to a lit place.
     pub fn explore(world: &World, elements: &Elements, seed: u64) -> Reach {
         let areas = Areas::new(&world.scene.mesh, elements);
-        let lit = |piece: usize| Side::BOTH.map(|side| is_lit(world, &areas, piece, side, seed));
-        Reach { alive: (0..elements.pieces as usize).into_par_iter().map(lit).collect() }
+        let lit = |piece: usize| Side::BOTH.map(|side| walks(world, &areas, piece, side, seed));
+        Reach { sides: (0..elements.pieces as usize).into_par_iter().map(lit).collect() }
     }
 }
 
@@ -78,27 +94,25 @@ impl Areas {
     }
 }
 
-/// Whether enough walks from random points on one side of a piece come to a lit place.
-fn is_lit(world: &World, areas: &Areas, piece: usize, side: Side, seed: u64) -> bool {
+/// Walks from random points on one side of a piece: whether enough of them come to a lit place, and whether enough
+/// of the points are such places.
+fn walks(world: &World, areas: &Areas, piece: usize, side: Side, seed: u64) -> Lit {
     let walks = WALKS + (SHARED as f32 * areas.piece(piece) / (2.0 * areas.total).max(1e-30)) as usize;
     let enough = walks.div_ceil(RARE);
     let mut rng = Rng::new(seed ^ 0x72_6561_6368, (2 * piece + side.index()) as u64);
-    let mut lit = 0;
+    let (mut lit, mut directly) = (0, 0);
     for _ in 0..walks {
-        let Some((p, n)) = areas.point(&world.scene.mesh, piece, &mut rng) else { return false };
-        lit += usize::from(walk(world, p, n * side.sign(), &mut rng));
-        if lit >= enough {
-            return true;
-        }
+        let Some((p, n)) = areas.point(&world.scene.mesh, piece, &mut rng) else { return Lit::default() };
+        let n = n * side.sign();
+        let shone = shone_on(world, p, n, &mut rng);
+        directly += usize::from(shone);
+        lit += usize::from(shone || walk(world, p, n, &mut rng));
     }
-    false
+    Lit { at_all: lit >= enough, directly: directly >= walks.div_ceil(SELDOM) }
 }
 
 /// Whether a walk from `p`, on a side of unit normal `n`, comes to a place that an emitter shines on, or to an emitter.
 fn walk(world: &World, p: Vec3, n: Vec3, rng: &mut Rng) -> bool {
-    if shone_on(world, p, n, rng) {
-        return true;
-    }
     let mut ray = Ray::new(offset_origin(p, n), to_world(sampling::cosine_hemisphere(rng.vec2()), n));
     for _ in 0..LONGEST {
         let Some(hit) = world.bvh.closest_hit(&ray) else { return world.scene.sky.is_some() };

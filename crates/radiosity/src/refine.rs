@@ -16,6 +16,7 @@ use geometry::math::offset_origin;
 use geometry::sampling::Lattice2;
 use geometry::{Ray, Rgb, World, triangle};
 use rayon::prelude::*;
+use std::collections::HashMap;
 
 /// A midpoint this far (relative) from its prediction, at the finest mesh, marks its surroundings for a gather of
 /// their own in pass 2.
@@ -23,7 +24,7 @@ const ROUGH: f32 = 0.15;
 /// Elements (of h0² each) that the first mesh may have, about.
 const FIRST_ELEMENTS: f32 = 10_000.0;
 /// Rays that probe the middle of a leaf.
-const PROBE: u32 = 128;
+const PROBE: u32 = 32;
 /// A gather ray starts this share of the way from its vertex into a facet: a vertex in the corner of a room lies on
 /// the walls, and a ray from there may start on the wrong side of one.
 pub(crate) const INWARD: f32 = 0.02;
@@ -53,6 +54,8 @@ pub(crate) struct Refiner<'a> {
 /// A vertex gathered to be compared with a prediction.
 struct Test {
     vertex: VertexId,
+    /// On which sides it is gathered: those where the light promises to change.
+    sides: [bool; 2],
     /// What predicted it: vertices and their weights.
     from: Vec<(VertexId, f32)>,
     /// Length of surface that the prediction stands for, m.
@@ -108,7 +111,7 @@ impl<'a> Refiner<'a> {
             chosen = choose(radius);
         }
         refiner.radius = radius;
-        refiner.gather(&chosen);
+        refiner.gather(&chosen.into_iter().map(|v| (v, [true; 2])).collect::<Vec<_>>());
         refiner
     }
 
@@ -135,17 +138,18 @@ impl<'a> Refiner<'a> {
             if chosen.is_empty() && members.is_empty() {
                 break;
             }
-            for &(a, b) in &chosen {
+            for &((a, b), _) in &chosen {
                 (rough[a as usize], rough[b as usize]) = (false, false);
             }
             let mut tests = self.split(&chosen);
             tests.extend(members.iter().map(|&(c, vertex, length)| Test {
                 vertex,
+                sides: [true; 2],
                 from: vec![(clusters.members[c].0, 1.0)],
                 length,
                 parted: false,
             }));
-            self.gather(&tests.iter().map(|t| t.vertex).collect::<Vec<_>>());
+            self.gather(&tests.iter().map(|t| (t.vertex, t.sides)).collect::<Vec<_>>());
             self.settle();
             let values = self.field.spread(&self.e);
             let floor = 0.1 * mean(&self.e).mean();
@@ -176,7 +180,7 @@ impl<'a> Refiner<'a> {
         let large = |&leaf: &u32| {
             let [a, b, c] = self.elements.corners(leaf);
             let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-            leaf >= *probed && longest > self.radius && self.diffuse[self.elements.piece_of(leaf)]
+            leaf >= *probed && longest > 2.0 * self.radius && self.diffuse[self.elements.piece_of(leaf)]
         };
         let leaves: Vec<u32> = self.elements.leaves().filter(large).collect();
         *probed = self.elements.nodes.len() as u32;
@@ -196,73 +200,99 @@ impl<'a> Refiner<'a> {
     }
 
     /// Of the edges and the clusters' furthest members, at most `room` that promise most: those along which E changes,
-    /// the longer the more. Also the promising edges for which there is no room.
+    /// the longer the more. Beside each edge the sides on which it does. Also the promising edges for which there is no
+    /// room.
     #[allow(clippy::type_complexity)]
     fn choose(
         &self,
         edges: &[(VertexId, VertexId)],
         members: Vec<Member>,
         room: usize,
-    ) -> (Vec<(VertexId, VertexId)>, Vec<(VertexId, VertexId)>, Vec<Member>) {
-        // Two ends that agree may still hide a bend between them: a tenth of what is there, and of what is elsewhere. So
-        // a panel whose corners lie dark behind a frame is looked at too.
+    ) -> (Vec<((VertexId, VertexId), [bool; 2])>, Vec<(VertexId, VertexId)>, Vec<Member>) {
+        // Two ends that agree may still hide a bend between them: a tenth of what is there, and of what is elsewhere on
+        // this side of the piece. So a panel of which most corners lie dark behind a frame is looked at too.
         const HIDDEN: f32 = 0.1;
         let values = self.field.spread(&self.e);
         let floor = 0.1 * mean(&self.e).mean();
-        let everywhere = mean(&self.e).mean();
-        let promise = |difference: f32, level: f32| match level + everywhere {
-            // Without indirect light there is still the direct one, for those who take it from the vertices.
-            0.0 => HIDDEN,
-            around => (difference + HIDDEN * around) / (level + floor),
-        };
+        let elsewhere = self.means_of_pieces();
+        let promise =
+            |difference: f32, level: f32, slot: usize| match level + elsewhere[self.piece_slot(slot)] {
+                // Without indirect light there may be the direct one, for those who take it from the vertices.
+                0.0 => {
+                    if self.reach.shone_on(self.elements.vertices[slot / 2].piece, Side::BOTH[slot % 2]) {
+                        HIDDEN
+                    } else {
+                        0.0
+                    }
+                }
+                around => (difference + HIDDEN * around) / (level + floor),
+            };
         let change = |a: VertexId, b: VertexId| {
-            let of = |side: Side| {
+            let piece = self.elements.vertices[a as usize].piece;
+            Side::BOTH.map(|side| {
+                if !self.reach.alive(piece, side) {
+                    return 0.0;
+                }
                 let (sa, sb) = (slot(a, side), slot(b, side));
                 match (self.field.usable(sa), self.field.usable(sb)) {
                     (true, true) => {
                         let (va, vb) = (values[sa], values[sb]);
-                        promise((va - vb).map(f32::abs).mean(), 0.5 * (va + vb).mean())
+                        promise((va - vb).map(f32::abs).mean(), 0.5 * (va + vb).mean(), sa)
                     }
                     // A buried end says nothing of the rest.
                     _ => 1.0,
                 }
-            };
-            let piece = self.elements.vertices[a as usize].piece;
-            let lit = |side: &&Side| self.reach.alive(piece, **side);
-            Side::BOTH.iter().filter(lit).map(|&side| of(side)).fold(0.0, f32::max)
+            })
         };
         let around = |v: VertexId| {
             let of = |&side: &Side| {
                 let s = slot(v, side);
-                promise(self.field.spread_around(s, &self.e), values[s].mean())
+                promise(self.field.spread_around(s, &self.e), values[s].mean(), s)
             };
             Side::BOTH.iter().filter(|&&side| self.field.usable(slot(v, side))).map(of).fold(0.0, f32::max)
         };
         let score = |promise: f32, length: f32| promise * (length / self.h0).min(1.0);
-        let mut all: Vec<(f32, usize)> = edges
+        let promises = |s: [f32; 2]| s.map(|s| s > self.config.tolerance);
+        let mut all: Vec<([f32; 2], usize)> = edges
             .par_iter()
-            .map(|&(a, b)| score(change(a, b), self.length(a, b)))
-            .chain(members.par_iter().map(|&(_, v, length)| score(around(v), length)))
+            .map(|&(a, b)| change(a, b).map(|promise| score(promise, self.length(a, b))))
+            .chain(members.par_iter().map(|&(_, v, length)| [score(around(v), length); 2]))
             .enumerate()
             .map(|(i, s)| (s, i))
-            .filter(|&(s, _)| s > self.config.tolerance)
+            .filter(|&(s, _)| promises(s).contains(&true))
             .collect();
-        all.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let better = |s: [f32; 2]| s[0].max(s[1]);
+        all.sort_unstable_by(|a, b| better(b.0).total_cmp(&better(a.0)).then(a.1.cmp(&b.1)));
         let kept = all.split_off(room.min(all.len()));
-        let edge = |&(_, i): &(f32, usize)| edges.get(i).copied();
-        let member = |&(_, i): &(f32, usize)| i.checked_sub(edges.len()).map(|m| members[m]);
+        let edge = |&(s, i): &([f32; 2], usize)| edges.get(i).map(|&edge| (edge, promises(s)));
+        let member = |&(_, i): &([f32; 2], usize)| i.checked_sub(edges.len()).map(|m| members[m]);
         (
             all.iter().filter_map(edge).collect(),
-            kept.iter().filter_map(edge).collect(),
+            kept.iter().filter_map(edge).map(|(edge, _)| edge).collect(),
             all.iter().filter_map(member).collect(),
         )
+    }
+
+    /// Mean E of each side of each piece, lx, over its sites.
+    fn means_of_pieces(&self) -> Vec<f32> {
+        let mut sums = vec![(0.0, 0u32); 2 * self.elements.pieces as usize];
+        for (site, e) in self.field.sites.iter().zip(&self.e) {
+            let sum = &mut sums[self.piece_slot(slot(site.vertex, site.side))];
+            *sum = (sum.0 + e.mean(), sum.1 + 1);
+        }
+        sums.into_iter().map(|(sum, n)| sum / n.max(1) as f32).collect()
+    }
+
+    /// Number of the side of a piece that a slot lies on.
+    fn piece_slot(&self, slot: usize) -> usize {
+        2 * self.elements.vertices[slot / 2].piece as usize + slot % 2
     }
 
     /// Relative difference of what was gathered from what was predicted, the worse side.
     fn error(&self, test: &Test, values: &[Rgb], floor: f32) -> f32 {
         Side::BOTH
             .iter()
-            .filter(|&&side| self.field.usable(slot(test.vertex, side)))
+            .filter(|side| test.sides[side.index()] && self.field.usable(slot(test.vertex, **side)))
             .map(|&side| {
                 let got = values[slot(test.vertex, side)];
                 let known = test.from.iter().filter(|(v, _)| self.field.usable(slot(*v, side)));
@@ -284,17 +314,22 @@ impl<'a> Refiner<'a> {
             .fold(0.0, f32::max)
     }
 
-    /// Splits the edges; each midpoint is a test.
-    fn split(&mut self, edges: &[(VertexId, VertexId)]) -> Vec<Test> {
+    /// Splits the edges; each midpoint is a test on the sides named.
+    fn split(&mut self, edges: &[((VertexId, VertexId), [bool; 2])]) -> Vec<Test> {
         let mut marks = EdgeMarks::default();
         let room = self.config.most_vertices.saturating_sub(self.elements.vertices.len());
-        for &(a, b) in edges.iter().take(room) {
+        let sides: HashMap<(VertexId, VertexId), [bool; 2]> = edges.iter().take(room).copied().collect();
+        for &(a, b) in sides.keys() {
             marks.mark(a, b);
         }
         self.elements.split(&mut marks);
         let midpoints = marks.split_edges();
+        for &(a, b, m) in &midpoints {
+            self.field.put_between(m, [a, b]);
+        }
         let test = |&(a, b, m): &(VertexId, VertexId, VertexId)| Test {
             vertex: m,
+            sides: sides.get(&(a, b)).copied().unwrap_or([true; 2]),
             from: vec![(a, 0.5), (b, 0.5)],
             length: self.length(a, b),
             parted: self.parted(a, b),

@@ -14,12 +14,14 @@ use std::collections::HashMap;
 const FACETS: usize = 16;
 
 impl Refiner<'_> {
-    /// Gathers at both sides, as far as light reaches them, of `vertices`; connects the field anew.
-    pub(crate) fn gather(&mut self, vertices: &[VertexId]) {
-        let origins = self.origins(vertices);
-        let jobs: Vec<(VertexId, Side)> = vertices
+    /// Gathers at those sides of the vertices that are named, as far as light reaches them; connects the field anew.
+    pub(crate) fn gather(&mut self, wanted: &[(VertexId, [bool; 2])]) {
+        let origins = self.origins(wanted.iter().map(|w| w.0));
+        let jobs: Vec<(VertexId, Side)> = wanted
             .iter()
-            .flat_map(|&v| Side::BOTH.map(|side| (v, side)))
+            .flat_map(|&(v, sides)| Side::BOTH.map(|side| (v, side, sides[side.index()])))
+            .filter(|&(.., wanted)| wanted)
+            .map(|(v, side, _)| (v, side))
             .filter(|&(v, side)| self.reach.alive(self.elements.vertices[v as usize].piece, side))
             .filter(|(v, _)| origins.contains_key(v))
             .collect();
@@ -73,9 +75,9 @@ impl Refiner<'_> {
     }
 
     /// For each of `vertices`, points just inside the facets around it.
-    fn origins(&self, vertices: &[VertexId]) -> HashMap<VertexId, Vec<Origin>> {
+    fn origins(&self, vertices: impl Iterator<Item = VertexId>) -> HashMap<VertexId, Vec<Origin>> {
         let mut wanted = vec![false; self.elements.vertices.len()];
-        for &v in vertices {
+        for v in vertices {
             wanted[v as usize] = true;
         }
         let mut origins: HashMap<VertexId, Vec<Origin>> = HashMap::new();
@@ -140,8 +142,7 @@ impl Refiner<'_> {
 
     /// Direct irradiance at every slot, lx: `samples` light samples at each site.
     pub(crate) fn direct(&self, samples: u32) -> Vec<Rgb> {
-        let vertices: Vec<VertexId> = self.field.sites.iter().map(|s| s.vertex).collect();
-        let origins = self.origins(&vertices);
+        let origins = self.origins(self.field.sites.iter().map(|s| s.vertex));
         let at_sites: Vec<Rgb> = self
             .field
             .sites

@@ -239,9 +239,9 @@ impl Ladder {
         let error = settings.error;
         let steps = |base: f32| 4u32.pow((base / error).log(4.0).ceil().clamp(1.0, 6.0) as u32);
         Ladder {
-            target: error,
-            most_camera: settings.samples.map_or(steps(0.6), |n| n.max(1)),
-            most_shadow: steps(0.6),
+            target: error / 2.0,
+            most_camera: settings.samples.map_or(steps(2.4), |n| n.max(1)),
+            most_shadow: steps(2.4),
         }
     }
 
@@ -261,21 +261,23 @@ impl Ladder {
                 let (camera_variance, light_variance) = pooled_variance(shots, shot, (x, y), (w, h));
                 let mut camera = relative(camera_variance) > self.target;
                 let mut shadow = relative(light_variance) > self.target;
-                if rung == 0 {
-                    camera |= shot.fine;
-                    for k in 0..9 {
-                        let (nx, ny) = (x + k % 3 - 1, y + k / 3 - 1);
-                        if k == 4 || nx < 0 || ny < 0 || nx >= w || ny >= h {
-                            continue;
-                        }
-                        let Some(other) = &shots[(ny * w + nx) as usize] else { continue };
-                        if !same_surface(&shot.key, &other.key) {
-                            camera = true;
-                        } else {
-                            shadow |= (shot.visible - other.visible).abs() > 0.03;
-                            let step = (shot.pixel.specular - other.pixel.specular).luminance();
-                            camera |= step * step > self.target * den;
-                        }
+                camera |= rung == 0 && shot.fine;
+                for k in 0..9 {
+                    let (nx, ny) = (x + k % 3 - 1, y + k / 3 - 1);
+                    if k == 4 || nx < 0 || ny < 0 || nx >= w || ny >= h {
+                        continue;
+                    }
+                    let Some(other) = &shots[(ny * w + nx) as usize] else { continue };
+                    if !same_surface(&shot.key, &other.key) {
+                        // Rays that all met one surface may have missed a sliver of the other, half of what one of
+                        // them stands for on average.
+                        let missed =
+                            (other.pixel.beauty() - beauty).luminance() * (0.5 / shot.effort.camera as f32);
+                        camera |= rung == 0 || missed * missed > self.target * self.target * den;
+                    } else if rung == 0 {
+                        shadow |= (shot.visible - other.visible).abs() > 0.03;
+                        let step = (shot.pixel.specular - other.pixel.specular).luminance();
+                        camera |= step * step > self.target * den;
                     }
                 }
                 let next = Effort {

@@ -103,11 +103,8 @@ fn a_tree_too_deep_is_halved_and_gives_the_same_hits() {
     let (items, order) = items::items(&mesh);
     for level in 0..4 {
         let binary = binary::build(&mesh, &items, order.clone());
-        let halved = Bvh {
-            tree: wide::fold_to(&mesh, binary, level),
-            tracer: deep.tracer,
-            count: Count::default(),
-        };
+        let halved =
+            Bvh { tree: wide::fold_to(&mesh, binary, level), tracer: deep.tracer, count: Count::default() };
         let random = &mut Random(7);
         for _ in 0..3000 {
             let ray = Ray::new(1.5 * random.cube(), random.direction());
