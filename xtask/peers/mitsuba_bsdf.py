@@ -257,82 +257,86 @@ class GltfBsdf(mi.BSDF):
         layers, frame = Layers(self, si, front, active), mi.Frame3f(ns)
         o = frame.to_local(eye)
         bs, weight = dr.zeros(mi.BSDFSample3f), mi.Color3f(0)
-        bs.eta = mi.Float(1)
-        light, kind = mi.Vector3f(0, 0, 1), mi.UInt32(0)
-        delta = mi.Bool(False)
+        # In world space until the end.
+        bs.wo, bs.eta, bs.sampled_type = mi.Vector3f(0, 0, 1), mi.Float(1), mi.UInt32(0)
 
-        u = mi.Float(sample1)
-        met = mi.Bool(True)
+        u, met = mi.Float(sample1), mi.Bool(True)
         if self.alpha_mode != "OPAQUE":
             met = u < layers.coverage
             u = dr.minimum(u / layers.coverage, 1 - 1e-7)
         diffuse = self.chance_of_diffuse(layers, o.z)
         by_base = met & (u < diffuse)
         if self.has_diffuse:
-            light[by_base] = frame.to_world(mi.warp.square_to_cosine_hemisphere(sample2))
-            kind[by_base] = mi.UInt32(+F.DiffuseReflection)
-        if self.has_specular:
-            by_facet = met & ~by_base
-            u = dr.clip((u - diffuse) / (1 - diffuse), 0, 1 - 1e-7)
-            if self.may_be_rough:
-                rough = by_facet & (layers.alpha > 0)
-                h = Ggx(dr.maximum(layers.alpha, 1e-4)).visible(o, sample2)
-                oh = dr.dot(o, h)
-                mirrored = 2 * oh * h - o
-                reflect = u < self.chance_of_reflection(layers, oh)
-                up = rough & reflect & (mirrored.z > 0)
-                light[up] = frame.to_world(mirrored)
-                kind[up] = mi.UInt32(+F.GlossyReflection)
-                if self.passes:
-                    if self.is_solid:
-                        cos_t = fresnel(oh, layers.eta)[1]
-                        passed = dr.normalize(o * -layers.eta + h * (layers.eta * oh - cos_t))
-                    else:
-                        passed = mi.Vector3f(mirrored.x, mirrored.y, -mirrored.z)
-                    down = rough & ~reflect & (passed.z < 0)
-                    light[down] = frame.to_world(passed)
-                    kind[down] = mi.UInt32(+F.GlossyTransmission)
-                    bs.eta[down] = 1 / layers.eta
-            if self.may_be_delta:
-                chance = self.chance_of_reflection(layers, o.z)
-                perfect = by_facet & (layers.alpha == 0)
-                up = perfect & (u < chance)
-                light[up] = self.fold(2 * o.z * ns - eye, ng, 1)
-                kind[up] = mi.UInt32(+F.DeltaReflection)
-                weight[up] = layers.reflection(o.z) / (chance * (1 - diffuse))
-                bs.pdf[up] = chance * (1 - diffuse)
-                delta |= up
-                if self.passes:
-                    down = perfect & ~up
-                    chance = (1 - chance) * (1 - diffuse)
-                    passed, name = -eye, F.Null
-                    if not self.straight:
-                        cos_t = fresnel(o.z, layers.eta)[1]
-                        bent = dr.normalize(eye * -layers.eta + ns * (layers.eta * o.z - cos_t))
-                        passed, name = self.fold(bent, ng, -1), F.DeltaTransmission
-                    light[down] = passed
-                    kind[down] = mi.UInt32(+name)
-                    weight[down] = layers.passing(o.z) * dr.square(layers.eta) / chance
-                    bs.pdf[down] = chance
-                    bs.eta[down] = 1 / layers.eta
-                    delta |= down
-        f, pdf = self.value(layers, o, frame.to_local(light), dr.dot(light, ng))
-        finite = (kind != 0) & ~delta
+            bs.wo[by_base] = frame.to_world(mi.warp.square_to_cosine_hemisphere(sample2))
+            bs.sampled_type[by_base] = mi.UInt32(+F.DiffuseReflection)
+        u = dr.clip((u - diffuse) / (1 - diffuse), 0, 1 - 1e-7)
+        if self.may_be_rough:
+            self.scatter(bs, layers, frame, o, u, sample2, met & ~by_base & (layers.alpha > 0))
+        f, pdf = self.value(layers, o, frame.to_local(bs.wo), dr.dot(bs.wo, ng))
+        finite = bs.sampled_type != 0
         bs.pdf[finite] = pdf
         weight[finite] = dr.select(pdf > 0, f / pdf, 0)
+        if self.may_be_delta:
+            perfect = met & ~by_base & (layers.alpha == 0)
+            share = self.send_on(bs, layers, eye, ns, ng, u, perfect)
+            bs.pdf[perfect] *= 1 - diffuse
+            weight[perfect] = share / (1 - diffuse)
         bs.pdf *= layers.coverage
         weight *= self.through(si, front)
         if self.alpha_mode != "OPAQUE":
-            light[~met] = -eye
-            kind[~met] = mi.UInt32(+F.Null)
-            weight[~met] = mi.Color3f(1)
+            bs.wo[~met] = -eye
+            bs.sampled_type[~met] = mi.UInt32(+F.Null)
             bs.pdf[~met] = 1 - layers.coverage
-        bs.wo = si.to_local(light)
-        bs.sampled_type = kind
+            weight[~met] = mi.Color3f(1)
+        bs.wo = si.to_local(bs.wo)
         bs.sampled_component = mi.UInt32(0)
         good = active & (bs.pdf > 0) & dr.all(dr.isfinite(weight))
         bs.pdf = dr.select(good, bs.pdf, 0)
         return bs, dr.select(good, weight, 0)
+
+    def scatter(self, bs, layers, frame, o, u, sample2, active):
+        """Fills in direction and kind of `bs` where a rough facet reflects or passes the light."""
+        h = Ggx(dr.maximum(layers.alpha, 1e-4)).visible(o, sample2)
+        oh = dr.dot(o, h)
+        mirrored = 2 * oh * h - o
+        reflect = u < self.chance_of_reflection(layers, oh)
+        up = active & reflect & (mirrored.z > 0)
+        bs.wo[up] = frame.to_world(mirrored)
+        bs.sampled_type[up] = mi.UInt32(+F.GlossyReflection)
+        if not self.passes:
+            return
+        passed = mi.Vector3f(mirrored.x, mirrored.y, -mirrored.z)
+        if self.is_solid:
+            cos_t = fresnel(oh, layers.eta)[1]
+            passed = dr.normalize(o * -layers.eta + h * (layers.eta * oh - cos_t))
+        down = active & ~reflect & (passed.z < 0)
+        bs.wo[down] = frame.to_world(passed)
+        bs.sampled_type[down] = mi.UInt32(+F.GlossyTransmission)
+        bs.eta[down] = 1 / layers.eta
+
+    def send_on(self, bs, layers, eye, ns, ng, u, active):
+        """Fills in `bs` where a perfect surface reflects or passes the light; returns share over chance."""
+        cos = dr.dot(eye, ns)
+        chance, share = self.chance_of_reflection(layers, cos), mi.Color3f(0)
+        up = active & (u < chance)
+        bs.wo[up] = self.fold(2 * cos * ns - eye, ng, 1)
+        bs.sampled_type[up] = mi.UInt32(+F.DeltaReflection)
+        bs.pdf[up] = chance
+        share[up] = layers.reflection(cos) / chance
+        if not self.passes:
+            return share
+        down = active & ~up
+        passed, kind = -eye, F.Null
+        if not self.straight:
+            cos_t = fresnel(cos, layers.eta)[1]
+            bent = dr.normalize(eye * -layers.eta + ns * (layers.eta * cos - cos_t))
+            passed, kind = self.fold(bent, ng, -1), F.DeltaTransmission
+        bs.wo[down] = passed
+        bs.sampled_type[down] = mi.UInt32(+kind)
+        bs.eta[down] = 1 / layers.eta
+        bs.pdf[down] = 1 - chance
+        share[down] = layers.passing(cos) * dr.square(layers.eta) / (1 - chance)
+        return share
 
     @staticmethod
     def fold(w, ng, side):

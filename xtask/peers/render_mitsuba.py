@@ -16,7 +16,9 @@ try:
     import drjit as dr
     import mitsuba as mi
 except ImportError:
-    peer.missing("Mitsuba is not installed: cargo xtask peers install")
+    peer.missing(
+        "Mitsuba is not installed: target/peers-venv/bin/pip install -r xtask/peers/requirements.txt"
+    )
 try:
     mi.set_variant("llvm_ad_rgb")
     dr.eval(mi.Float(0) + 1)
@@ -28,7 +30,7 @@ import numpy as np  # noqa: E402
 from denoise import Missing, denoise  # noqa: E402
 from mitsuba_scene import Builder  # noqa: E402: reads Mitsuba's variant
 
-LANES = 1 << 21  # paths a pass, for memory: about half a kilobyte each
+LANES = 1 << 23  # paths a pass: many, for they are stratified together; memory hardly grows with them
 
 
 def passes(spp, most):
