@@ -89,6 +89,7 @@ pub fn read(scene: &Scene, folder: &Path, root: &Path) -> Gallery {
     }));
     let fastest = fastest(scene, ERROR, |c| c.ours).map(|(curve, _)| &curve.method);
     for curve in &scene.curves {
+        let name = if curve.comparable { curve.label.clone() } else { format!("{} †", curve.label) };
         let by_time = gallery.moment.and_then(|m| nearest(curve, m, |p| p.seconds));
         let by_error = nearest(curve, ERROR, |p| p.error);
         for (i, point) in curve.points.iter().enumerate() {
@@ -99,7 +100,7 @@ pub fn read(scene: &Scene, folder: &Path, root: &Path) -> Gallery {
             }
             match one(&folder.join(path), &reference, gallery.exposure) {
                 Ok((shown, errors)) => gallery.pictures.push(Picture {
-                    name: curve.label.clone(),
+                    name: name.clone(),
                     caption: caption(point),
                     at_time,
                     at_error,

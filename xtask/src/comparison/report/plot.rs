@@ -115,7 +115,7 @@ impl Layout {
                     frame,
                     legend: (20.0, 350.0 + 68.0),
                     letters: 42,
-                    heading: (38, 15.0),
+                    heading: (40, 14.0),
                 }
             }
         }

@@ -110,9 +110,7 @@ fn strip(gallery: &Gallery, pictures: &[(&Picture, &Encoded)]) -> String {
              <img class=\"shown\" src=\"{}\" alt=\"{name}\">{}</button>\
              <figcaption><strong>{name}</strong> {}<br>{badges}</figcaption></figure>\n",
             e.shown,
-            errors.unwrap_or_else(
-                || "<span class=\"errors none\">no error map: it is the measure</span>".into()
-            ),
+            errors.unwrap_or_default(),
             escape(&p.caption),
         )
     };
