@@ -126,9 +126,9 @@ impl Field {
                 }
             })
             .collect();
-        for s in 0..self.sources.len() {
+        for (s, &site) in site_of.iter().enumerate() {
             let Some(ends) = self.parents.get(&((s / 2) as VertexId)) else { continue };
-            if site_of[s] == u32::MAX {
+            if site == u32::MAX {
                 let [a, b] = ends.map(|v| 2 * v as usize + s % 2);
                 self.sources[s] = match (self.usable(a), self.usable(b)) {
                     (true, true) => Source::Between(a, b),
