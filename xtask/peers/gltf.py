@@ -1,11 +1,11 @@
 """glTF 2.0 read for other renderers: a scene as plain arrays in world space, glTF's defaults filled in.
 
 `load(path)` gives a `Scene`: what the file's default scene shows, metres, y up, photometric units. Read are
-.gltf and .glb, buffers and images in the file, beside it or as data URIs, every kind of accessor (interleaved,
-normalised, quantised, sparse), triangle lists, strips and fans, node hierarchies, several primitives a mesh,
-KHR_lights_punctual, KHR_materials_{emissive_strength, ior, specular, transmission, unlit, volume},
-KHR_texture_transform, KHR_mesh_quantization. Not read: Draco, meshopt, skins, morph targets, animations,
-instancing.
+.gltf and .glb, buffers and images in the file, beside it or as data URIs, every kind of accessor
+(interleaved, normalised, quantised, sparse), triangle lists, strips and fans, node hierarchies, several
+primitives a mesh, KHR_lights_punctual, KHR_materials_{emissive_strength, ior, specular, transmission, unlit,
+volume}, KHR_texture_transform, KHR_mesh_quantization. Not read: Draco, meshopt, skins, morph targets,
+animations, instancing.
 
 The camera: as in twolight, `yfov` is the angle over the picture's height and the picture's own aspect ratio
 gives the width, whatever `aspect` the file states.

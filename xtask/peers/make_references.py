@@ -2,9 +2,10 @@
 
     python xtask/peers/make_references.py [NAME ...] --seconds 3600
 
-samples the scenes named (all by default) in turns for about that long, then writes NAME.a.exr and NAME.b.exr. Sums are
-kept in --scratch after every round: the command may be stopped at any time, and called again it goes on from there.
-`--seconds 0` only converts what there is. Path tracing without a bound on length, clamping or denoising.
+samples the scenes named (all by default) in turns for about that long, then writes NAME.a.exr and NAME.b.exr.
+Sums are kept in --scratch after every round: the command may be stopped at any time, and called again it goes
+on from there. `--seconds 0` only converts what there is. Path tracing without a bound on length, clamping or
+denoising.
 """
 
 import argparse
@@ -37,8 +38,10 @@ PASS = 64  # samples a pixel; a square, so that they are stratified in both dire
 
 
 def noise(a, b):
-    """Error of the mean of two independent halves, a fraction, by the metric of `twolight compare`: half their
-    difference, relative to mean_c ref² + 0.01 M², M the mean luminance with the brightest tenth capped."""
+    """Error of the mean of two independent halves, a fraction, by the metric of `twolight compare`.
+
+    Half their difference, relative to mean_c ref² + 0.01 M², M the mean luminance, the brightest tenth capped.
+    """
     mean = 0.5 * (a + b)
     luminance = mean @ [0.2126, 0.7152, 0.0722]
     level = np.minimum(luminance, np.quantile(luminance, 0.9)).mean()

@@ -1,15 +1,16 @@
-"""glTF's materials as a BSDF of Mitsuba 3: the model that twolight's crates/geometry/src/bsdf/ describes, written anew.
+"""glTF's materials as a BSDF of Mitsuba 3: the model that crates/geometry/src/bsdf describes, written anew.
 
     material   = mix(dielectric, metal, metallic)
     metal      = GGX reflection, Schlick with F0 = base colour
     dielectric = GGX coat over mix(diffuse base, transmission, transmission factor)
 
-after glTF 2.0, appendix B, and KHR_materials_{ior, specular, transmission, volume}. The appendix leaves open how coat
-and base share the light; here the base carries (1 − E(wo)) (1 − E(wi)) / (1 − E̅), E being the coat's directional
-albedo (Kelemen and Szirmay-Kalos 2001). Below a roughness of 0.03 mirror and glass are perfect. Glass with a volume
-uses Fresnel's equations, everything else Schlick's. Light is scattered once between microfacets. Reflection is from
-both sides; thin glass and what alpha leaves out let light straight on; the light that a coloured volume swallows is
-taken off at the surface where it leaves, by the length of the way there.
+after glTF 2.0, appendix B, and KHR_materials_{ior, specular, transmission, volume}. The appendix leaves open
+how coat and base share the light; here the base carries (1 − E(wo)) (1 − E(wi)) / (1 − E̅), E being the
+coat's directional albedo (Kelemen and Szirmay-Kalos 2001). Below a roughness of 0.03 mirror and glass are
+perfect. Glass with a volume uses Fresnel's equations, everything else Schlick's. Light is scattered once
+between microfacets. Reflection is from both sides; thin glass and what alpha leaves out let light straight
+on; the light that a coloured volume swallows is taken off at the surface where it leaves, by the length of
+the way there.
 
 Import after `mitsuba.set_variant`.
 """
@@ -132,7 +133,7 @@ class GltfBsdf(mi.BSDF):
         return dr.select(alpha >= self.alpha_cutoff, 1.0, 0.0) if self.alpha_mode == "MASK" else alpha
 
     def place(self, si, active):
-        """Direction to the viewer, geometric and shading normal on its side, and whether it sees the front."""
+        """Direction to the viewer, geometric and shading normal on its side, whether it sees the front."""
         wo = si.to_world(si.wi)
         front = dr.dot(si.n, wo) >= 0
         n = mi.Vector3f(si.sh_frame.n)
@@ -340,7 +341,7 @@ class GltfBsdf(mi.BSDF):
 
     @staticmethod
     def fold(w, ng, side):
-        """Where the shading normal sends a perfect ray to the wrong side of the triangle: mirrored in its plane."""
+        """A perfect ray that the shading normal sends to the wrong side: mirrored in the triangle's plane."""
         below = dr.dot(w, ng)
         return dr.select(below * side > 0, w, w - 2 * below * ng)
 

@@ -1,4 +1,4 @@
-"""Fresnel terms, GGX and its directional albedo on Mitsuba's wavefronts. Import after `mitsuba.set_variant`."""
+"""Fresnel terms, GGX and its directional albedo, for Mitsuba. Import after `mitsuba.set_variant`."""
 
 import functools
 import math
@@ -64,8 +64,10 @@ class Ggx:
 
 @functools.cache
 def albedo_table():
-    """Directional albedo of GGX reflection: for (√α, √cos) the means of G2/G1 and G2/G1 (1 − V·H)⁵, as a flat array
-    (rows · columns, 2), and for each row their averages over the cosine-weighted hemisphere, (rows, 2)."""
+    """Directional albedo of GGX reflection by √α and √cos: the means of G2/G1 and of G2/G1 (1 − V·H)⁵.
+
+    A flat array (rows · columns, 2), and for each row their averages over the cosine-weighted hemisphere.
+    """
     n = 48
     u, v = ((np.stack(np.meshgrid(np.arange(n), np.arange(n)), -1).reshape(-1, 2) + 0.5) / n).T
     table = np.empty((ROWS, COLUMNS, 2))
@@ -90,7 +92,7 @@ def albedo_table():
 
             weight = np.where(i[:, 2] > 0, (1 + hidden(o)) / (1 + hidden(o) + hidden(i)), 0)
             table[row, column] = weight.mean(), (weight * np.clip(1 - oh, 0, 1) ** 5).mean()
-    # With μ = x², 2 ∫ E μ dμ = 4 ∫ E x³ dx over the interpolated table, so that the base loses just what the coat has.
+    # With μ = x², 2 ∫ E μ dμ = 4 ∫ E x³ dx; of the interpolated table, so that no energy is lost.
     x = (np.arange((COLUMNS - 1) * 32) + 0.5) / 32
     left, t = x.astype(int), (x % 1)[:, None]
     between = table[:, left] * (1 - t) + table[:, left + 1] * t

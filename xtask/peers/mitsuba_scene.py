@@ -67,7 +67,7 @@ class Builder:
         low, high = scene.bounds()
         self.diagonal = float(np.linalg.norm(high - low))
         self.decoded = {}
-        # Windows and alpha: shadow rays must pass them, which Mitsuba's `volpath` does and its `path` does not.
+        # Windows and alpha: shadow rays must pass them, as those of `volpath` do and those of `path` do not.
         self.see_through = False
 
     def note(self, text):
@@ -75,7 +75,7 @@ class Builder:
             self.notes.append(text)
 
     def build(self, camera, size, depth):
-        """The scene for `camera` (a name or None) and a picture of `size`; roulette from `depth` bounces on."""
+        """The scene for `camera` (a name or None), a picture of `size`, roulette from `depth` bounces on."""
         result = {"type": "scene", "camera": self.sensor(self.scene.camera(camera), size)}
         for number, material in enumerate(self.scene.materials):
             meshes = [mesh for mesh in self.scene.meshes if mesh.material == number]
@@ -123,7 +123,7 @@ class Builder:
         return result
 
     def shapes(self, material, meshes):
-        """Meshes of one material and kind as one shape; two, back to back, where light is emitted to both sides."""
+        """Meshes of one material and kind as one shape, or two, back to back, for a lamp with two sides."""
         if material.unlit:
             raise Unsupported(f"material {material.name!r} is unlit")
         positions = np.concatenate([m.positions for m in meshes])
@@ -209,7 +209,7 @@ class Builder:
         return result
 
     def texture(self, texture, channels, scale=None):
-        """A Mitsuba texture of the channels "rgb" (decoded from sRGB), "raw" (RGB as it is), "red" or "alpha"."""
+        """A texture of Mitsuba: "rgb" (decoded from sRGB), "raw" (RGB as it is), "red" or "alpha"."""
         key = (texture.image, channels)
         if key not in self.decoded:
             self.decoded[key] = _decode(self.scene.images[texture.image], channels)

@@ -2,9 +2,10 @@
 
     python xtask/peers/render_mitsuba.py SCENE OUT.exr --size 384x256 --effort 64 [--camera NAME] [--denoise]
 
-Uses the variant llvm_ad_rgb, which needs LLVM's library (Debian's libllvm19, or DRJIT_LIBLLVM_PATH). Materials are
-glTF's, in a BSDF of our own (mitsuba_bsdf.py), and so are punctual lights (mitsuba_scene.py). Where light may go
-straight on, through windows and alpha, Mitsuba's `volpath` takes the place of `path`: its shadow rays pass there.
+Uses the variant llvm_ad_rgb, which needs LLVM's library (Debian's libllvm19, or DRJIT_LIBLLVM_PATH).
+Materials are glTF's, in a BSDF of our own (mitsuba_bsdf.py), and so are punctual lights (mitsuba_scene.py).
+Where light may go straight on, through windows and alpha, Mitsuba's `volpath` takes the place of `path`: its
+shadow rays pass there.
 """
 
 import math
