@@ -1,7 +1,7 @@
 //! Who renders, and with which settings: one method, one ladder from rough to fine.
 
 use super::scene::Subject;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// A way to render, as the comparison shows it: a curve each.
@@ -88,15 +88,14 @@ impl Program {
     /// The command that renders one picture.
     pub fn command(self, args: &[String], shot: Shot) -> Command {
         let subject = shot.subject;
-        let target = crate::root().join("target");
         let mut command = match self {
             Program::Twolight => {
-                let mut command = Command::new(target.join("release/twolight"));
+                let mut command = Command::new(twolight());
                 command.arg("render").arg(&subject.file).arg("-o").arg(shot.out).args(["--json", "--quiet"]);
                 command
             }
             Program::Peer(name) => {
-                let mut command = Command::new(target.join("peers-venv/bin/python"));
+                let mut command = Command::new(crate::root().join("target/peers-venv/bin/python"));
                 command.arg(crate::root().join(format!("xtask/peers/render_{name}.py")));
                 command.arg(&subject.file).arg(shot.out);
                 command
@@ -107,5 +106,54 @@ impl Program {
         command.arg("--threads").arg(shot.threads.to_string()).arg("--seed").arg(shot.seed.to_string());
         command.args(args);
         command
+    }
+}
+
+/// Our binary: beside this program's folder, for that is where Cargo was told to build.
+pub fn twolight() -> PathBuf {
+    let target = std::env::current_exe().ok().and_then(|exe| Some(exe.parent()?.parent()?.to_path_buf()));
+    let target = target.unwrap_or_else(|| crate::root().join("target"));
+    target.join("release").join(format!("twolight{}", std::env::consts::EXE_SUFFIX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::peer;
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_method_has_a_key_and_a_ladder_of_its_own() {
+        let methods: Vec<Method> = ours().into_iter().chain(peer::all()).collect();
+        let keys: BTreeSet<&str> = methods.iter().map(|m| m.key).collect();
+        assert_eq!(keys.len(), methods.len());
+        for method in &methods {
+            let settings: BTreeSet<&str> = method.ladder.iter().map(|r| r.setting.as_str()).collect();
+            assert!(settings.len() == method.ladder.len() && settings.len() > 3, "{}", method.key);
+        }
+    }
+
+    #[test]
+    fn a_rung_becomes_a_command() {
+        let subject = Subject {
+            name: "room".into(),
+            file: "room.glb".into(),
+            camera: "door".into(),
+            width: 30,
+            height: 20,
+            triangles: 12,
+            reference: Default::default(),
+        };
+        let shot = Shot { subject: &subject, threads: 2, seed: 7, out: Path::new("out.exr") };
+        let words = |method: &Method| -> Vec<String> {
+            let command = method.program.command(&method.ladder[1].args, shot);
+            command.get_args().skip(1).map(|word| word.to_string_lossy().into_owned()).collect()
+        };
+        let common = "--size 30x20 --camera door --threads 2 --seed 7";
+        let split = ours().into_iter().find(|m| m.key == "split").unwrap();
+        let expected = format!("room.glb -o out.exr --json --quiet {common} --diffuse split --error 5%");
+        assert_eq!(words(&split).join(" "), expected);
+        let denoised = peer::all().into_iter().find(|m| m.key == "cycles-oidn").unwrap();
+        assert_eq!(words(&denoised).join(" "), format!("room.glb out.exr {common} --denoise --effort 16"));
     }
 }

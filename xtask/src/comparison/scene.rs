@@ -1,5 +1,6 @@
 //! What is rendered: scenes with the references they are held against.
 
+use super::method;
 use super::process;
 use super::results;
 use anyhow::{Context, Result, ensure};
@@ -78,7 +79,7 @@ pub fn files(folder: &Path) -> Result<Vec<PathBuf>> {
 
 /// What `twolight inspect` says of `file`.
 pub fn inspect(file: &Path) -> Result<Inspected> {
-    let mut command = Command::new(crate::root().join("target/release/twolight"));
+    let mut command = Command::new(method::twolight());
     let ran = process::run(command.arg("inspect").arg(file).arg("--json"), Duration::from_secs(600))?;
     ensure!(ran.code == Some(0), "cannot inspect {}: {}", file.display(), ran.last_words());
     serde_json::from_str(&ran.stdout).with_context(|| format!("what inspect says of {}", file.display()))
