@@ -30,6 +30,11 @@ const STEPS: &[Step] = &[
         env: &[("RUSTDOCFLAGS", "-D warnings")],
     },
     Step { name: "test", command: "cargo test --release --workspace", env: &[] },
+    Step {
+        name: "pictures",
+        command: "cargo run --release --quiet --package xtask -- reference-comparison --quick",
+        env: &[],
+    },
 ];
 
 /// The names that `--without` takes.
