@@ -34,15 +34,15 @@ pub fn fastest(scene: &Scene, error: f64, which: impl Fn(&Curve) -> bool) -> Opt
     curves.filter_map(|c| Some((c, seconds_to(c, error)?))).min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Seconds at which pictures are compared: what our fastest method takes to 2 %, else to the best it reaches; `None`
-/// for a scene without pictures of ours.
-pub fn moment(scene: &Scene) -> Option<f64> {
-    let ours = |c: &Curve| c.ours;
-    if let Some((_, seconds)) = fastest(scene, 0.02, ours) {
-        return Some(seconds);
-    }
-    let best = scene.curves.iter().filter(|c| c.ours).filter_map(Curve::best);
-    best.min_by(|a, b| a.error.total_cmp(&b.error)).map(|p| p.seconds).filter(|s| s.is_finite() && *s > 0.0)
+/// Seconds at which pictures are compared, and whose they are: what our fastest method takes to 2 %, else to the best
+/// that we reach; `None` for a scene without pictures of ours.
+pub fn moment(scene: &Scene) -> Option<(&Curve, f64)> {
+    fastest(scene, 0.02, |c| c.ours).or_else(|| {
+        let ours = scene.curves.iter().filter(|c| c.ours);
+        let bests = ours.filter_map(|c| Some((c, c.best()?)));
+        let (curve, best) = bests.min_by(|a, b| a.1.error.total_cmp(&b.1.error))?;
+        (best.seconds.is_finite() && best.seconds > 0.0).then_some((curve, best.seconds))
+    })
 }
 
 #[cfg(test)]
@@ -61,7 +61,7 @@ mod tests {
         let (curve, seconds) = fastest(&scene, 0.02, |_| true).unwrap();
         assert_eq!(curve.method, "split");
         assert!((2.0..3.0).contains(&seconds), "{seconds}");
-        assert_eq!(moment(&scene), Some(seconds));
+        assert_eq!(moment(&scene).map(|(c, s)| (c.method.as_str(), s)), Some(("split", seconds)));
     }
 
     #[test]

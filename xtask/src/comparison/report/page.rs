@@ -89,7 +89,10 @@ fn overview(results: &Results, parts: &Parts) -> String {
         ("system", machine.system.clone()),
         ("threads", results.threads.to_string()),
         ("commit", results.commit.clone()),
-        ("this page", format!("{pictures} pictures, {:.1} MB", parts.picture_bytes as f64 / 1e6)),
+        (
+            "this page",
+            format!("{pictures} pictures and their error maps, {:.1} MB", parts.picture_bytes as f64 / 1e6),
+        ),
     ];
     let versions: Vec<(&str, String)> =
         results.versions.iter().map(|(name, version)| (name.as_str(), version.clone())).collect();

@@ -1,6 +1,6 @@
 //! The pictures of a scene, all shown at the exposure of its reference, and where each of them errs.
 
-use super::front::{fastest, moment};
+use super::front::moment;
 use super::words::{percent, seconds};
 use crate::base64::base64;
 use crate::comparison::results::{Curve, Point, Scene};
@@ -69,8 +69,13 @@ pub struct Encoded {
 /// Reads the pictures of `scene` that are to be shown: paths from `folder`, the reference's from `root`. Whatever
 /// cannot be read is listed, not fatal: a page without one picture is better than none.
 pub fn read(scene: &Scene, folder: &Path, root: &Path) -> Gallery {
-    let mut gallery =
-        Gallery { exposure: 0.0, moment: moment(scene), pictures: vec![], first: 1, missing: vec![] };
+    let mut gallery = Gallery {
+        exposure: 0.0,
+        moment: moment(scene).map(|(_, s)| s),
+        pictures: vec![],
+        first: 1,
+        missing: vec![],
+    };
     let reference = match read_reference(&root.join(&scene.reference.path)) {
         Ok(reference) => reference.mean,
         Err(e) => {
@@ -87,7 +92,7 @@ pub fn read(scene: &Scene, folder: &Path, root: &Path) -> Gallery {
         shown,
         errors: None,
     }));
-    let fastest = fastest(scene, ERROR, |c| c.ours).map(|(curve, _)| &curve.method);
+    let ours = moment(scene).map(|(curve, _)| &curve.method);
     for curve in &scene.curves {
         let name = if curve.comparable { curve.label.clone() } else { format!("{} †", curve.label) };
         let by_time = gallery.moment.and_then(|m| nearest(curve, m, |p| p.seconds));
@@ -95,7 +100,7 @@ pub fn read(scene: &Scene, folder: &Path, root: &Path) -> Gallery {
         for (i, point) in curve.points.iter().enumerate() {
             let (at_time, at_error) = (by_time == Some(i), by_error == Some(i));
             let Some(path) = point.picture.as_ref().filter(|_| at_time || at_error) else { continue };
-            if at_time && fastest == Some(&curve.method) {
+            if at_time && ours == Some(&curve.method) {
                 gallery.first = gallery.pictures.len();
             }
             match one(&folder.join(path), &reference, gallery.exposure) {

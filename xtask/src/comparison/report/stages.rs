@@ -89,8 +89,10 @@ fn nearest(curve: &Curve) -> Option<&Point> {
 
 /// In the order in which stages happen; none where a renderer tells nothing.
 fn parts(point: &Point) -> Vec<Part<'_>> {
+    // What takes less than a two-hundredth cannot be seen, and would only lengthen the key.
+    let seen = |s: f64| s.is_finite() && s > 0.005 * point.seconds.max(0.0);
     let told: Vec<(&String, f64)> =
-        point.stages.iter().map(|(n, s)| (n, *s)).filter(|(_, s)| s.is_finite() && *s > 0.0).collect();
+        point.stages.iter().map(|(n, s)| (n, *s)).filter(|(_, s)| seen(*s)).collect();
     let sum: f64 = told.iter().map(|(_, s)| s).sum();
     if sum <= 0.0 {
         return Vec::new();

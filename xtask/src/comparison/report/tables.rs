@@ -19,12 +19,14 @@ pub fn at_a_glance(results: &Results) -> Table {
             if ours.is_none() && other.is_none() {
                 continue;
             }
-            let told = |side: Option<(&Curve, f64)>| match side {
+            let told = |found: Option<(&Curve, f64)>, ours: bool| match found {
                 Some((curve, s)) => format!("{} ({})", seconds(s), curve.label),
-                None => "not reached".into(),
+                None if scene.curves.iter().any(|c| c.comparable && c.ours == ours) => "not reached".into(),
+                None => "not measured".into(),
             };
             let factor = ours.zip(other).map_or(NONE.into(), |(o, x)| ratio(x.1 / o.1));
-            let row = [scene.name.clone(), short_percent(level), told(ours), told(other), factor];
+            let row =
+                [scene.name.clone(), short_percent(level), told(ours, true), told(other, false), factor];
             table.rows.push(row.into_iter().map(Cell::from).collect());
         }
     }
@@ -88,9 +90,10 @@ pub fn points(scene: &Scene) -> Table {
     table
 }
 
+/// Stages that take more than a hundredth of the process.
 fn stages(point: &Point) -> String {
-    let stages: Vec<String> =
-        point.stages.iter().map(|(name, s)| format!("{name} {}", seconds(*s))).collect();
+    let told = point.stages.iter().filter(|(_, s)| **s > 0.01 * point.seconds);
+    let stages: Vec<String> = told.map(|(name, s)| format!("{name} {}", seconds(*s))).collect();
     if stages.is_empty() { NONE.into() } else { stages.join(", ") }
 }
 
