@@ -10,7 +10,7 @@ coat's directional albedo (Kelemen and Szirmay-Kalos 2001). Below a roughness of
 perfect. Glass with a volume uses Fresnel's equations, everything else Schlick's. Light is scattered once
 between microfacets. Reflection is from both sides; thin glass and what alpha leaves out let light straight
 on; the light that a coloured volume swallows is taken off at the surface where it leaves, by the length of
-the way there.
+the way there. (Of light that ends on something inside the volume nothing is taken off.)
 
 Import after `mitsuba.set_variant`.
 """
