@@ -205,7 +205,7 @@ def render(camera, args, folder):
     count, divisions, super_samples, accuracy = LADDER[args.effort]
     size = ["-pa", 0, "-x", args.width, "-y", args.height]
     settings = ["-ab", 16, "-ad", divisions, "-as", super_samples, "-aa", accuracy, "-ar", 512]
-    settings += ["-n", args.threads, "-ds", 0.2, "-dj", 1, "-dt", 0, "-dc", 1]
+    settings += ["-n", args.threads, "-ds", 0, "-dj", 1, "-dt", 0, "-dc", 1]
     settings += ["-ss", 1, "-st", 0, "-lr", -10, "-lw", 1e-3, "-u+"]
     with open(folder / "rays", "wb") as file:
         run("vwrays", "-ff", "-c", count, "-pj", 1, *view, *size, stdout=file)

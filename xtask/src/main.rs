@@ -7,6 +7,7 @@ mod check;
 mod comparison;
 #[cfg(test)]
 mod ourselves;
+mod peers;
 mod scenes;
 
 use anyhow::Result;
@@ -40,6 +41,11 @@ enum Chore {
     /// Run a program and write down its time and memory: for `reference-comparison`
     #[command(hide = true)]
     Measured(comparison::Measured),
+    /// Say which other renderers are here, for `reference-comparison`
+    Peers {
+        #[command(subcommand)]
+        what: Option<Peers>,
+    },
     /// Write the scenes that a function describes into assets/
     Scenes {
         /// Write nothing; fail if a file in assets/ differs from what its function gives
@@ -54,12 +60,20 @@ enum Bench {
     Rays(bench_rays::Args),
 }
 
+#[derive(Subcommand)]
+enum Peers {
+    /// Install them into target/peers-venv, from Python's registry
+    Install,
+}
+
 fn main() -> Result<()> {
     match Args::parse().chore {
         Chore::Bench(Bench::Rays(args)) => bench_rays::run(args),
         Chore::Check { without, browser } => check::run(&without, browser),
         Chore::ReferenceComparison(args) => comparison::run(args),
         Chore::Measured(args) => comparison::measured(args),
+        Chore::Peers { what: None } => peers::list(),
+        Chore::Peers { what: Some(Peers::Install) } => peers::install(),
         Chore::Scenes { check: false } => scenes::write(&root().join("assets")),
         Chore::Scenes { check: true } => scenes::check(&root().join("assets")),
     }
