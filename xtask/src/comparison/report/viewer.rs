@@ -89,7 +89,7 @@ fn scale() -> String {
 
 fn strip(gallery: &Gallery, pictures: &[(&Picture, &Encoded)]) -> String {
     let badge = |on: bool, text: Option<String>| match text.filter(|_| on) {
-        Some(text) => format!("<b class=\"badge\">≈ {text}</b>"),
+        Some(text) => format!("<b class=\"badge\">nearest to {text}</b>"),
         None => String::new(),
     };
     let shot = |(i, (p, e)): (usize, &(&Picture, &Encoded))| {
