@@ -3,8 +3,12 @@
 The same as in glTF: triangles, shading normals, textures, Lambertian surfaces, parallelograms that shine (as area
 lights whose points shine by Lambert's law), mirrors with Schlick's term, thin glass. What differs is in the notes of
 each picture.
+
+Measured in the Cornell box: direct light is right within 0.1 %, what is lit by reflected light alone up to 10 % too
+dark (3.4 % of the picture's light), which neither more bounces nor smaller error bounds nor more samples cure.
 """
 
+import dataclasses
 import math
 import re
 import shutil
@@ -125,7 +129,9 @@ class World:
                 self.lamps(mesh, m)
                 # Radiosity must not find again what the sources give, and they stand on their lamp.
                 flags = "no_radiosity no_shadow"
-                report.note("Lamps neither reflect nor cast shadows.")
+                report.note("Lamps cast no shadows.")
+                dark = self.texture(dataclasses.replace(m, emissive=(0.0, 0.0, 0.0)))
+                self.text.append(f"mesh2 {{ {' '.join(parts)} {dark} no_image no_reflection no_shadow }}")
         self.text.append(f"mesh2 {{ {' '.join(parts)} {self.texture(m)} {flags} }}")
 
     def lamps(self, mesh, m):
