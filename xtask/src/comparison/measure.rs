@@ -101,7 +101,14 @@ pub fn render(program: Program, rung: &Rung, shot: Shot, limit: Duration) -> Res
             Err(error) => Outcome::Failed(format!("its report cannot be read: {error:#}")),
         },
         Some(code) => Outcome::Failed(format!("failed with status {code}: {why}")),
-        None => Outcome::Failed(format!("ended by a signal: {why}")),
+        None => match (program, told(program, &ran)) {
+            // Some renderers crash while they take leave, their picture and report safely written.
+            (Program::Peer(_), Ok(mut told)) if shot.out.is_file() => {
+                told.notes.push("It crashed after its picture was written.".into());
+                Outcome::Done(told)
+            }
+            _ => Outcome::Failed(format!("ended by a signal: {why}")),
+        },
     })
 }
 

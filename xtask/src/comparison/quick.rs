@@ -65,6 +65,8 @@ pub fn check(subjects: &[Subject], threads: u32) -> Result<()> {
 
 /// Measures every subject by every setting with several seeds, and writes the baseline. Entries of other scenes stay.
 pub fn write(subjects: &[Subject], threads: u32) -> Result<()> {
+    // Now: by the end, someone may have gone on to edit.
+    let commit = machine::commit();
     let old = Baseline::read(&file()).unwrap_or_default();
     let folder = tempfile::tempdir()?;
     let mut entries = Vec::new();
@@ -94,7 +96,7 @@ pub fn write(subjects: &[Subject], threads: u32) -> Result<()> {
     let kept: Vec<Entry> = old.entries.into_iter().filter(|entry| !measured(entry)).collect();
     entries.extend(kept);
     entries.sort_by(|a, b| (&a.scene, &a.setting).cmp(&(&b.scene, &b.setting)));
-    Baseline { commit: machine::commit(), entries }.write(&file())
+    Baseline { commit, entries }.write(&file())
 }
 
 fn cases(subjects: &[Subject]) -> impl Iterator<Item = (&Subject, &'static [&'static str])> {
