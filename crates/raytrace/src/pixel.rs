@@ -1,7 +1,7 @@
 //! One pixel of the hybrid picture: as many rays through it as it needs, each surface they find shaded once.
 
 use crate::film::Pixel;
-use crate::integrator::hybrid::{Hybrid, Quality};
+use crate::integrator::hybrid::{Hybrid, Photons, Quality};
 use geometry::sampling::Rng;
 use geometry::{Camera, MaterialId, Projection, Ray, Rgb, Surface, Vec3, World};
 
@@ -201,7 +201,7 @@ fn one_surface(
     let wo = -ray.direction;
     // A sliver of a pixel needs fewer shadow rays for the same noise in the pixel.
     let shadow = if part < 0.3 && effort.shadow > 4 { effort.shadow / 4 } else { effort.shadow };
-    let quality = Quality { shadow, gather: true, photons: true };
+    let quality = Quality { shadow, gather: true, photons: Photons::Always };
     let (lit, plan) = hybrid.diffuse(surface, wo, quality, phase, rng);
     let albedo = surface.bsdf.diffuse_albedo(wo);
     let textured = varies(hybrid.world, surface.material);
@@ -223,20 +223,23 @@ fn one_surface(
     p.indirect += lit.indirect * tint * coverage;
     p.irradiance += lit.irradiance * coverage;
     p.albedo += mean_albedo * part;
-    let (mut sum, mut square) = (Rgb::BLACK, 0.0);
+    let (mut sum, mut steps, mut before) = (Rgb::BLACK, 0.0, None);
     for &i in &g.hits {
         let (ray, surface) = &hits[i];
         let beside = hybrid.beside_diffuse(surface, ray, &plan, rng);
         p.emission += beside.emission * share;
         sum += beside.specular;
-        square += beside.specular.luminance() * beside.specular.luminance();
+        let level = beside.specular.luminance();
+        steps += before.replace(level).map_or(0.0, |before: f32| (level - before).powi(2));
         p.normal += surface.ns * share;
         p.depth += surface.position.distance(ray.origin) * share / shot_alpha(hits.len() as f32 * share);
     }
     p.specular += sum * share + lit.glossy * coverage;
     if count > 1.0 {
-        let mean = sum.luminance() / count;
-        shot.camera_variance += (square / count - mean * mean).max(0.0) / (count - 1.0) * part * part;
+        // Half the mean square of the step from one stratum to the next: noise counts whole, and a slope across the
+        // pixel, which the strata average out, hardly (von Neumann, "Distribution of the Ratio of the Mean Square
+        // Successive Difference to the Variance", 1941).
+        shot.camera_variance += 0.5 * steps / (count - 1.0) / count * part * part;
     }
     shot.light_variance += lit.variance * coverage * coverage;
     p.variance += lit.gather_variance * coverage * coverage;

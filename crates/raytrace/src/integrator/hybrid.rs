@@ -26,6 +26,9 @@ const BRANCHING: u32 = 6;
 /// a dielectric coat is, a rough metal is not.
 const FAINT: f32 = 0.12;
 
+/// A caustic of this share of the other light is looked up photon by photon in a mirror.
+const HARDLY: f32 = 0.15;
+
 /// How much to spend on one surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Quality {
@@ -33,8 +36,19 @@ pub struct Quality {
     pub shadow: u32,
     /// Whether to gather at the surface where the mode or an unresolved mesh asks for it: for what the eye sees directly.
     pub gather: bool,
-    /// Whether to look caustics up photon by photon: for what it sees directly or in a mirror.
-    pub photons: bool,
+    /// Where to look caustics up photon by photon.
+    pub photons: Photons,
+}
+
+/// Where caustics are looked up photon by photon; elsewhere the vertices' blurred ones will do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Photons {
+    /// For what the eye sees directly.
+    Always,
+    /// For what it sees in a mirror or through glass.
+    WhereTheyMatter,
+    /// For what hardly shows.
+    Never,
 }
 
 /// Shades surfaces of one world with one solution.
@@ -131,11 +145,18 @@ impl Hybrid<'_> {
             let seen = photometry::reflected_radiance(albedo, Rgb::WHITE).luminance();
             out.gather_variance = trust * trust * variance * seen * seen;
         }
-        // Only what the eye sees directly, or nearly so, needs a caustic's own sharpness.
-        e += if from_vertices || !quality.photons {
-            self.solution.caustic(self.world, t, u, v, side)
-        } else {
+        // Only what the eye sees directly, or nearly so, needs a caustic's own sharpness; in a mirror only where the
+        // vertices know of one.
+        let blurred = self.solution.caustic(self.world, t, u, v, side);
+        let sharp = match quality.photons {
+            Photons::Always => true,
+            Photons::WhereTheyMatter => blurred.luminance() > HARDLY * e.luminance(),
+            Photons::Never => false,
+        };
+        e += if sharp && !from_vertices {
             self.solution.caustics.irradiance(surface.position, surface.ng)
+        } else {
+            blurred
         };
         out.indirect = photometry::reflected_radiance(albedo + quasi, e);
         out.irradiance += e;
@@ -279,9 +300,10 @@ impl Hybrid<'_> {
             return shown;
         }
         let shadow = if weight > 0.25 { 4 } else { 1 };
+        let photons = if weight > 0.5 { Photons::WhereTheyMatter } else { Photons::Never };
         let phase = (rng.f32() * 16.0) as u32;
         let (diffuse, plan) =
-            self.diffuse(surface, wo, Quality { shadow, gather: false, photons: weight > 0.5 }, phase, rng);
+            self.diffuse(surface, wo, Quality { shadow, gather: false, photons }, phase, rng);
         diffuse.direct
             + diffuse.indirect
             + diffuse.glossy
