@@ -202,7 +202,8 @@ fn one_surface(
     // A sliver of a pixel needs fewer shadow rays for the same noise in the pixel.
     let shadow = if part < 0.3 && effort.shadow > 4 { effort.shadow / 4 } else { effort.shadow };
     let quality = Quality { shadow, gather: true, photons: Photons::Always };
-    let (lit, plan) = hybrid.diffuse(surface, wo, quality, phase, rng);
+    let places: Vec<Vec3> = g.hits.iter().map(|&i| hits[i].1.position).collect();
+    let (lit, plan) = hybrid.diffuse(surface, wo, quality, phase, &places, rng);
     let albedo = surface.bsdf.diffuse_albedo(wo);
     let textured = varies(hybrid.world, surface.material);
     let mean_albedo = if textured && g.hits.len() > 1 {

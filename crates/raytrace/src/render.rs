@@ -278,6 +278,9 @@ impl Ladder {
                         shadow |= (shot.visible - other.visible).abs() > 0.03;
                         let step = (shot.pixel.specular - other.pixel.specular).luminance();
                         camera |= step * step > self.target * den;
+                        // A caustic's edge may run through the pixel.
+                        let step = (shot.pixel.indirect - other.pixel.indirect).luminance();
+                        camera |= step * step > 16.0 * self.target * self.target * den;
                     }
                 }
                 let next = Effort {

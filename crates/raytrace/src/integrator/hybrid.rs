@@ -29,6 +29,9 @@ const FAINT: f32 = 0.12;
 /// A caustic of this share of the other light is looked up photon by photon in a mirror.
 const HARDLY: f32 = 0.15;
 
+/// Points of a pixel at most that caustics are averaged over.
+const CAUSTIC_PLACES: usize = 16;
+
 /// How much to spend on one surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Quality {
@@ -85,12 +88,16 @@ pub struct Diffuse {
 
 impl Hybrid<'_> {
     /// The diffuse part of `surface`, and the lamps in its glossy lobes.
+    ///
+    /// - `phase`: see [`Spend`].
+    /// - `places`: points of the surface that caustics are averaged over, which may be finer than a pixel; at least one.
     pub fn diffuse(
         &self,
         surface: &Surface,
         wo: Vec3,
         quality: Quality,
         phase: u32,
+        places: &[Vec3],
         rng: &mut Rng,
     ) -> (Diffuse, Plan) {
         let plan = Plan::new(self.world, surface.position, surface.ns, quality.shadow);
@@ -154,13 +161,32 @@ impl Hybrid<'_> {
             Photons::Never => false,
         };
         e += if sharp && !from_vertices {
-            self.solution.caustics.irradiance(surface.position, surface.ng)
+            self.caustic_over(places, surface.ng, 0.1 * e.luminance())
         } else {
             blurred
         };
         out.indirect = photometry::reflected_radiance(albedo + quasi, e);
         out.irradiance += e;
         (out, plan)
+    }
+
+    /// Mean irradiance by photons over `places`, lx: a few of them where those agree within `tolerance` lx.
+    fn caustic_over(&self, places: &[Vec3], ng: Vec3, tolerance: f32) -> Rgb {
+        const FEW: usize = 3;
+        let spread_out = |n: usize| places.iter().step_by(places.len().div_ceil(n).max(1));
+        let mean = |n: usize| {
+            let (mut sum, mut count, mut low, mut high) = (Rgb::BLACK, 0.0, f32::INFINITY, 0f32);
+            for &p in spread_out(n) {
+                let e = self.solution.caustics.irradiance(p, ng);
+                let y = e.luminance();
+                (sum, count, low, high) = (sum + e, count + 1.0, low.min(y), high.max(y));
+            }
+            (sum / f32::max(count, 1.0), high - low)
+        };
+        match mean(FEW) {
+            (few, spread) if spread <= tolerance || places.len() <= FEW => few,
+            _ => mean(CAUSTIC_PLACES).0,
+        }
     }
 
     /// Indirect irradiance by a gather of rays that read the solution where they end, lx, and the variance of
@@ -302,8 +328,14 @@ impl Hybrid<'_> {
         let shadow = if weight > 0.25 { 4 } else { 1 };
         let photons = if weight > 0.5 { Photons::WhereTheyMatter } else { Photons::Never };
         let phase = (rng.f32() * 16.0) as u32;
-        let (diffuse, plan) =
-            self.diffuse(surface, wo, Quality { shadow, gather: false, photons }, phase, rng);
+        let (diffuse, plan) = self.diffuse(
+            surface,
+            wo,
+            Quality { shadow, gather: false, photons },
+            phase,
+            &[surface.position],
+            rng,
+        );
         diffuse.direct
             + diffuse.indirect
             + diffuse.glossy
