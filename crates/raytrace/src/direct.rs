@@ -4,13 +4,13 @@
 //! the visible share of it, so a point that sees a whole lamp has no noise at all (Heitz, Hill and McGuire,
 //! "Combining Analytic Direct Illumination and Stochastic Shadows", I3D 2018).
 
-use geometry::emitter::{EmitterKind, LightSample};
+use geometry::emitter::{EmitterKind, Group, LightSample};
 use geometry::sampling::Rng;
 use geometry::{Rgb, Surface, Vec3, World};
 
-/// Up to so many lights are looked at one by one; more are drawn from the tree.
+/// Up to so many lights are looked at one by one; more are put into as many groups at most.
 const FEW: usize = 32;
-/// A light that brings this share of the unshadowed light gets rays of its own; the smaller ones share some.
+/// A group that brings this share of the unshadowed light gets rays of its own; the smaller ones share some.
 const OWN: f32 = 0.04;
 
 /// How many rays to spend, and which strata this pixel takes of the pattern that its neighbours complete.
@@ -25,71 +25,63 @@ pub struct Spend {
 /// Which lights are sampled at a point, how often.
 #[derive(Debug, Default)]
 pub struct Plan {
-    /// Each with its number of samples and the probability with which it is chosen for each (1 for lights of their own).
-    entries: Vec<(u32, u32, f32)>,
-    /// Samples drawn from the lights of `pooled`, or from the tree when there are more lights than [`FEW`].
+    entries: Vec<Entry>,
+    /// Samples drawn from the entries that share them.
     pool: u32,
-    tree: bool,
+}
+
+/// A light, or several as one.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    group: Group,
+    samples: u32,
+    /// Probability with which it is chosen for each of the samples: 1 where they are its own.
+    chance: f32,
 }
 
 impl Plan {
     /// Divides `samples` among the lights as they would shine on `p` with normal `n` if nothing stood between.
     pub fn new(world: &World, p: Vec3, n: Vec3, samples: u32) -> Plan {
-        let lights = world.emitters.len();
-        if lights == 0 || samples == 0 {
+        if world.emitters.is_empty() || samples == 0 {
             return Plan::default();
         }
-        if lights > FEW {
-            return Plan { entries: Vec::new(), pool: samples.max(2), tree: true };
-        }
-        let importance: Vec<f32> = (0..lights as u32).map(|l| world.emitters.importance(l, p, n)).collect();
-        let total: f32 = importance.iter().sum();
+        let groups = world.emitters.groups(p, n, FEW);
+        let total: f32 = groups.iter().map(|g| g.1).sum();
         if total <= 0.0 {
             return Plan::default();
         }
         let mut entries = Vec::new();
         let (mut small, mut pool) = (0.0, 0);
-        for (light, &w) in importance.iter().enumerate() {
+        for &(group, w) in &groups {
             if w >= OWN * total {
                 // The strata come in powers of four; a light that brings a quarter of the light deserves a quarter of
                 // the rays for the same noise.
                 let share = (samples as f32 * w / total).max(1.0);
                 let own = 4u32.pow(share.log(4.0).ceil() as u32).min(samples);
-                entries.push((light as u32, own, 1.0));
+                entries.push(Entry { group, samples: own, chance: 1.0 });
             } else {
                 small += w;
             }
         }
         if small > 0.0 {
             pool = (samples / 8).max(1);
-            for (light, &w) in importance.iter().enumerate() {
-                if w > 0.0 && w < OWN * total {
-                    entries.push((light as u32, pool, w / small));
-                }
-            }
+            let few = groups.iter().filter(|&&(_, w)| w > 0.0 && w < OWN * total);
+            entries.extend(few.map(|&(group, w)| Entry { group, samples: pool, chance: w / small }));
         }
-        Plan { entries, pool, tree: false }
+        Plan { entries, pool }
     }
 
     /// Expected number of samples per solid angle (1/sr) toward `point` on the emissive `triangle`: what multiple
     /// importance sampling weighs a ray that ran into it by.
     pub fn density(&self, world: &World, p: Vec3, n: Vec3, triangle: u32, point: Vec3) -> f32 {
-        if self.tree {
-            return self.pool as f32 * world.emitters.pdf_triangle(p, n, triangle, point);
-        }
-        let Some(light) = world.emitters.light_of_triangle(triangle) else { return 0.0 };
-        let shape = match &world.emitters.lights()[light as usize] {
-            EmitterKind::Polygon(shape) | EmitterKind::Textured(shape) => shape,
-            _ => return 0.0,
+        let of = |e: &Entry| {
+            e.samples as f32 * e.chance * world.emitters.pdf_in_group(e.group, p, n, triangle, point)
         };
-        self.times(light) * shape.pdf(p, point)
+        self.entries.iter().map(of).sum()
     }
 
     /// As [`Plan::density`], toward the sky.
-    pub fn density_sky(&self, world: &World, n: Vec3, wi: Vec3) -> f32 {
-        if self.tree {
-            return self.pool as f32 * world.emitters.pdf_sky(n, wi);
-        }
+    pub fn density_sky(&self, world: &World, wi: Vec3) -> f32 {
         let lights = world.emitters.lights().iter().enumerate();
         lights
             .filter_map(|(l, kind)| {
@@ -100,7 +92,8 @@ impl Plan {
 
     /// Expected samples that `light` gets.
     fn times(&self, light: u32) -> f32 {
-        self.entries.iter().find(|e| e.0 == light).map_or(0.0, |&(_, n, q)| n as f32 * q)
+        let entry = self.entries.iter().find(|e| e.group == Group::Light(light));
+        entry.map_or(0.0, |e| e.samples as f32 * e.chance)
     }
 }
 
@@ -142,22 +135,22 @@ pub fn direct(
 ) -> Direct {
     let mut out = Direct::default();
     let mut unshadowed = 0.0;
-    if plan.tree {
-        sample_tree(world, surface, wo, plan, gloss, rng, &mut out);
-        return out;
-    }
     let has_diffuse = surface.bsdf.has_diffuse();
-    for &(light, samples, chance) in plan.entries.iter().filter(|e| e.2 == 1.0) {
-        let kind = &world.emitters.lights()[light as usize];
+    for &Entry { group, samples, chance } in plan.entries.iter().filter(|e| e.chance == 1.0) {
+        let kind = match group {
+            Group::Light(light) => Some(&world.emitters.lights()[light as usize]),
+            Group::Branch(_) => None,
+        };
         let exact = match kind {
-            EmitterKind::Polygon(shape) => Some(shape.irradiance(surface.position, surface.ns)),
+            Some(EmitterKind::Polygon(shape)) => Some(shape.irradiance(surface.position, surface.ns)),
             _ => None,
         };
-        let samples = if matches!(kind, EmitterKind::Punctual(_)) { 1 } else { samples };
+        let samples = if matches!(kind, Some(EmitterKind::Punctual(_))) { 1 } else { samples };
         let mut part = Part::default();
         for k in 0..samples {
             let u = stratum(k, samples, spend.phase, rng);
-            let Some(s) = world.emitters.sample_light(&world.scene, light, surface.position, u) else {
+            let Some(s) = world.emitters.sample_group(&world.scene, group, surface.position, surface.ns, u)
+            else {
                 part.count += 1;
                 continue;
             };
@@ -276,7 +269,7 @@ fn pooled(
     out: &mut Direct,
     unshadowed: &mut f32,
 ) {
-    let small: Vec<_> = plan.entries.iter().filter(|e| e.2 < 1.0).collect();
+    let small: Vec<_> = plan.entries.iter().filter(|e| e.chance < 1.0).collect();
     if small.is_empty() {
         return;
     }
@@ -284,11 +277,12 @@ fn pooled(
     for _ in 0..plan.pool {
         let mut u = rng.f32();
         let chosen = small.iter().find(|e| {
-            u -= e.2;
+            u -= e.chance;
             u < 0.0
         });
-        let &&(light, _, chance) = chosen.unwrap_or(&small[small.len() - 1]);
-        match world.emitters.sample_light(&world.scene, light, surface.position, [rng.f32(), rng.f32()]) {
+        let &&Entry { group, chance, .. } = chosen.unwrap_or(&small[small.len() - 1]);
+        let u = [rng.f32(), rng.f32()];
+        match world.emitters.sample_group(&world.scene, group, surface.position, surface.ns, u) {
             Some(s) => {
                 let s = LightSample { pdf: s.pdf * chance, ..s };
                 part.add(world, surface, wo, &s, plan.pool as f32, gloss, surface.bsdf.has_diffuse());
@@ -297,29 +291,6 @@ fn pooled(
         }
     }
     part.finish(None, out, unshadowed);
-}
-
-/// Many lights: drawn from the tree.
-fn sample_tree(
-    world: &World,
-    surface: &Surface,
-    wo: Vec3,
-    plan: &Plan,
-    gloss: Gloss,
-    rng: &mut Rng,
-    out: &mut Direct,
-) {
-    let mut part = Part::default();
-    for i in 0..plan.pool {
-        let u = [(i as f32 + rng.f32()) / plan.pool as f32, rng.f32(), rng.f32()];
-        match world.emitters.sample(&world.scene, surface.position, surface.ns, u) {
-            Some(s) => part.add(world, surface, wo, &s, plan.pool as f32, gloss, surface.bsdf.has_diffuse()),
-            None => part.count += 1,
-        }
-    }
-    let mut unshadowed = 0.0;
-    part.finish(None, out, &mut unshadowed);
-    out.visible = if unshadowed > 0.0 { (out.irradiance.luminance() / unshadowed).min(1.0) } else { 1.0 };
 }
 
 /// Sample `k` of `n` in [0, 1)², n a power of four: each in a stratum of its own. Of an 8 × 8 grid of strata a pixel of

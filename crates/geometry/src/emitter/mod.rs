@@ -5,6 +5,7 @@ mod bounds;
 mod build;
 mod choice;
 mod emit;
+mod group;
 mod merge;
 mod punctual;
 mod spherical;
@@ -14,6 +15,7 @@ mod tree;
 
 pub use area::PolygonLight;
 pub use emit::Emission;
+pub use group::Group;
 pub use merge::MAX_CORNERS;
 pub use punctual::{range_window, spot_falloff};
 

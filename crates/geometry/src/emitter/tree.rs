@@ -155,8 +155,14 @@ impl LightTree {
 
     /// A light for the point `p` with unit normal `n` (zero for none), and the probability of that choice.
     /// `None` when no light can reach the point. `u` in [0, 1).
-    pub fn choose(&self, p: Vec3, n: Vec3, mut u: f32) -> Option<(u32, f32)> {
-        let mut node = self.nodes.first()?;
+    pub fn choose(&self, p: Vec3, n: Vec3, u: f32) -> Option<(u32, f32)> {
+        self.choose_below(0, p, n, u).map(|(light, probability, _)| (light, probability))
+    }
+
+    /// As [`LightTree::choose`] among the lights below the node `top`; also what is left of `u`, as even in [0, 1) as
+    /// `u` was.
+    pub fn choose_below(&self, top: u32, p: Vec3, n: Vec3, mut u: f32) -> Option<(u32, f32, f32)> {
+        let mut node = self.nodes.get(top as usize)?;
         let mut probability = 1.0;
         while !node.leaf {
             let first = node.child_or_light as usize;
@@ -166,21 +172,66 @@ impl LightTree {
             probability *= taken;
             node = &self.nodes[next];
         }
-        (probability > 0.0).then_some((node.child_or_light, probability))
+        (probability > 0.0).then_some((node.child_or_light, probability, u))
     }
 
     /// The probability with which [`LightTree::choose`] takes `light`.
     pub fn probability(&self, light: u32, p: Vec3, n: Vec3) -> f32 {
-        let mut node = self.leaves[light as usize] as usize;
+        self.probability_below(0, light, p, n)
+    }
+
+    /// The probability with which [`LightTree::choose_below`] takes `light`; 0 for one that is not below `top`.
+    pub fn probability_below(&self, top: u32, light: u32, p: Vec3, n: Vec3) -> f32 {
+        let Some(&leaf) = self.leaves.get(light as usize) else { return 0.0 };
+        let mut node = leaf;
         let mut probability = 1.0;
-        while node != 0 {
-            let parent = &self.nodes[self.nodes[node].parent as usize];
-            let first = parent.child_or_light as usize;
-            let Some(share) = self.share(first, p, n) else { return 0.0 };
+        while node != top {
+            if node == 0 {
+                return 0.0;
+            }
+            let up = self.parent(node);
+            let first = self.nodes[up as usize].child_or_light;
+            let Some(share) = self.share(first as usize, p, n) else { return 0.0 };
             probability *= if node == first { share } else { 1.0 - share };
-            node = self.nodes[node].parent as usize;
+            node = up;
         }
         probability
+    }
+
+    /// At most `most` nodes that together hold every light that can reach `p`, each with its importance there. Those
+    /// are divided first whose importance says least of their lights: strong ones, seen large.
+    pub fn cut(&self, p: Vec3, n: Vec3, most: usize) -> Vec<(u32, f32)> {
+        // Below this share of the whole, weighed by the angle it is seen under, a node stays together.
+        const SMALL: f32 = 0.02;
+        let promise = |node: u32| self.nodes[node as usize].importance(p, n).min(f32::MAX / 4.0);
+        let mut cut: Vec<(u32, f32)> = if self.nodes.is_empty() { Vec::new() } else { vec![(0, promise(0))] };
+        cut.retain(|c| c.1 > 0.0);
+        while cut.len() < most {
+            let total: f32 = cut.iter().map(|c| c.1).sum();
+            let doubt = |&(node, importance): &(u32, f32)| {
+                let node = &self.nodes[node as usize];
+                let seen = node.radius / node.centre.distance(p).max(f32::MIN_POSITIVE);
+                if node.leaf { 0.0 } else { importance * seen.min(1.0) }
+            };
+            let Some((at, worst)) =
+                cut.iter().map(doubt).enumerate().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))
+            else {
+                break;
+            };
+            if worst <= SMALL * total {
+                break;
+            }
+            let first = self.nodes[cut[at].0 as usize].child_or_light;
+            cut.swap_remove(at);
+            cut.extend([first, first + 1].map(|c| (c, promise(c))).into_iter().filter(|c| c.1 > 0.0));
+        }
+        cut
+    }
+
+    /// The light of a leaf.
+    pub fn light_of(&self, node: u32) -> Option<u32> {
+        let node = &self.nodes[node as usize];
+        node.leaf.then_some(node.child_or_light)
     }
 
     /// The first child's share of the importance of two children side by side; `None` when both have none.

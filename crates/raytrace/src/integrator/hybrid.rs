@@ -288,8 +288,7 @@ impl Hybrid<'_> {
     fn incoming(&self, ray: Ray, weight: f32, depth: u32, from: Option<&From>, rng: &mut Rng) -> Rgb {
         let Some(hit) = self.world.closest(&ray) else {
             let Some(sky) = &self.world.scene.sky else { return Rgb::BLACK };
-            let share = from
-                .map_or(1.0, |f| f.pdf / (f.pdf + f.plan.density_sky(self.world, f.normal, ray.direction)));
+            let share = from.map_or(1.0, |f| f.pdf / (f.pdf + f.plan.density_sky(self.world, ray.direction)));
             return sky.radiance(ray.direction) * share;
         };
         let surface = Surface::new(&self.world.scene, &ray, &hit);
