@@ -425,9 +425,9 @@ impl<'a> Refiner<'a> {
             if !self.reach.alive(self.elements.vertices[corners[0] as usize].piece, side) {
                 return (false, false);
             }
-            let usable = corners.map(|v| self.field.usable(slot(v, side)));
-            let half_buried = usable.contains(&true) && usable.contains(&false);
-            let coarse = half_buried || corners.iter().any(|&v| unresolved[v as usize]);
+            // Of a leaf with all corners in other things (a shelf between books) the mesh knows nothing.
+            let buried = corners.iter().any(|&v| !self.field.usable(slot(v, side)));
+            let coarse = buried || corners.iter().any(|&v| unresolved[v as usize]);
             (self.pierced(n, side), coarse)
         })
     }
