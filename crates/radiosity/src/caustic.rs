@@ -26,6 +26,15 @@ const LONGEST: usize = 32;
 /// Photons kept at most (56 bytes each).
 const MOST: usize = 2_000_000;
 
+/// How far an estimate may look for photons, m: a tenth of a room, or where photons are few as far as ten of them lie
+/// apart if they lie evenly; a room at most. Nearer, each lone photon is a bright dot of its own.
+fn reach(world: &World, photons: usize) -> f32 {
+    let mesh = &world.scene.mesh;
+    let area: f32 = (0..mesh.triangles.len() as u32).map(|t| mesh.area(t)).sum();
+    let ten = (10.0 * area / (std::f32::consts::PI * photons.max(1) as f32)).sqrt();
+    ten.clamp(0.1 * world.scale, world.scale)
+}
+
 /// A particle where it landed.
 #[derive(Clone, Copy, Debug)]
 struct Photon {
@@ -85,7 +94,8 @@ impl Caustics {
         photons.truncate(MOST); // bounded by memory; with 32 landings a particle it takes 62 500 particles at least
         let mut axes = vec![0; photons.len()];
         balance(&mut photons, &mut axes);
-        Caustics { photons, axes, reach: 0.1 * world.scale, sent: last * BATCH }
+        let reach = reach(world, photons.len());
+        Caustics { photons, axes, reach, sent: last * BATCH }
     }
 
     /// Number of photons kept.

@@ -145,8 +145,11 @@ impl Hybrid<'_> {
             // shrinkage); in `gather` it stands for itself.
             let trust = match self.mode {
                 DiffuseMode::Gather => 1.0,
-                // Four times, so that a single lucky ray, whose own spread is its only witness, is not believed.
-                _ => (1.0 - 4.0 * variance / difference.luminance().powi(2).max(1e-30)).max(0.0),
+                // Where the mesh knows nothing there is nothing to correct.
+                _ if e.is_black() => 1.0,
+                // Eight times, so that a few lucky rays, whose own spread is their only witness, are not believed:
+                // four left white specks on a ceiling over chrome chairs.
+                _ => (1.0 - 8.0 * variance / difference.luminance().powi(2).max(1e-30)).max(0.0),
             };
             e += difference * trust;
             let seen = photometry::reflected_radiance(albedo, Rgb::WHITE).luminance();
