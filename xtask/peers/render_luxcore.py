@@ -13,6 +13,8 @@ bidirectional paths give 5 % too much light.
 
 import contextlib
 import math
+import os
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -219,6 +221,9 @@ def main():
         session.GetFilm().GetOutputFloat(pyluxcore.FilmOutputType.RGB, pixels, 0, False)
     peer.write_exr(args.out, pixels[::-1], f"{Path(args.scene).name}, LuxCore, {args.effort} spp, cd/m2")
     report.end(f"LuxCore {pyluxcore.Version()}", f"{args.effort} spp")
+    # LuxCore crashes when Python takes it down; all is written by now.
+    sys.stdout.flush()
+    os._exit(0)
 
 
 if __name__ == "__main__":

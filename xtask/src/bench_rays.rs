@@ -7,6 +7,7 @@ mod embree;
 mod rays;
 mod scene;
 
+use crate::comparison::results::RaySpeed;
 use anyhow::Result;
 use embree::Embree;
 use geometry::Ray;
@@ -41,8 +42,18 @@ pub fn run(args: Args) -> Result<()> {
     Ok(())
 }
 
-/// One scene: builds, then rounds of every batch by every tracer.
-fn measure(name: &str, args: &Args) -> Result<()> {
+/// Speed of our best kernel and of Embree on the scenes that a function makes, for a report.
+pub fn speeds() -> Result<Vec<RaySpeed>> {
+    let args = Args { scenes: Vec::new(), rounds: 3, fast: true, embree: "/usr/include".into() };
+    let mut all = Vec::new();
+    for scene in ["room", "million"] {
+        all.extend(measure(scene, &args)?);
+    }
+    Ok(all)
+}
+
+/// One scene: builds, then rounds of every batch by every tracer; prints a table, and returns our best kernel's line.
+fn measure(name: &str, args: &Args) -> Result<Vec<RaySpeed>> {
     let (mesh, camera) = scene::load(name)?;
     let kernels: Vec<Kernel> = Kernel::ALL
         .into_iter()
@@ -88,7 +99,16 @@ fn measure(name: &str, args: &Args) -> Result<()> {
         }
         println!("    {}", row.iter().map(|h| h.1.to_string()).collect::<Vec<_>>().join(" "));
     }
-    Ok(())
+    let speed = |(i, batch): (usize, &Batch)| {
+        let rate = |row: &Vec<(f64, usize)>| batch.rays.len() as f64 / row[i].0 / 1e6;
+        RaySpeed {
+            scene: format!("{name}, {triangles} triangles"),
+            kind: batch.name.to_string(),
+            ours: best[others..].iter().map(rate).fold(0.0, f64::max),
+            embree: best[..others].first().map(rate),
+        }
+    };
+    Ok(batches.iter().enumerate().map(speed).collect())
 }
 
 /// Traces a batch with our tree: CPU seconds and number of hits.

@@ -130,6 +130,10 @@ pub fn run(args: Args) -> Result<()> {
             results.write(&file)
         })?;
     }
+    if !args.keep && args.only.is_empty() && args.scenes.is_none() {
+        results.rays = crate::bench_rays::speeds()?;
+        results.write(&file)?;
+    }
     if args.scaling {
         let settings = scaling::Settings { threads, longest: args.longest, out: &out, known: &subjects };
         scaling::run(&settings, |sweep| {
