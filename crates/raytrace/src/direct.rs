@@ -12,6 +12,10 @@ use geometry::{Rgb, Surface, Vec3, World};
 const FEW: usize = 32;
 /// A group that brings this share of the unshadowed light gets rays of its own; the smaller ones share some.
 const OWN: f32 = 0.04;
+/// This share of the chances of those that share rays is the same for all: a lamp of which only a sliver rises over
+/// the horizon brings next to nothing, but the one ray that finds the sliver must not count for a thousand (it left
+/// white dots in a furnace).
+const EVEN: f32 = 0.2;
 
 /// How many rays to spend, and which strata this pixel takes of the pattern that its neighbours complete.
 #[derive(Clone, Copy, Debug)]
@@ -65,8 +69,9 @@ impl Plan {
         }
         if small > 0.0 {
             pool = (samples / 8).max(1);
-            let few = groups.iter().filter(|&&(_, w)| w > 0.0 && w < OWN * total);
-            entries.extend(few.map(|&(group, w)| Entry { group, samples: pool, chance: w / small }));
+            let few: Vec<_> = groups.iter().filter(|&&(_, w)| w > 0.0 && w < OWN * total).collect();
+            let chance = |w: f32| (1.0 - EVEN) * w / small + EVEN / few.len() as f32;
+            entries.extend(few.iter().map(|&&(group, w)| Entry { group, samples: pool, chance: chance(w) }));
         }
         Plan { entries, pool }
     }
