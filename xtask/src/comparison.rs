@@ -130,7 +130,7 @@ pub fn run(args: Args) -> Result<()> {
             results.write(&file)
         })?;
     }
-    if !args.keep && args.only.is_empty() && args.scenes.is_none() {
+    if results.rays.is_empty() && args.only.is_empty() && args.scenes.is_none() {
         results.rays = crate::bench_rays::speeds()?;
         results.write(&file)?;
     }
