@@ -20,6 +20,9 @@ pub const SCALE_TOLERANCE: f64 = 0.05;
 pub const SHIFT_TOLERANCE: f64 = 0.25;
 /// A shift less certain than this, pixels, is not judged: a picture without edges has none.
 const CERTAIN: f64 = 0.05;
+/// A reference whose neighbouring pixels differ by less, as a share of its brightness, has no edges: a furnace, of which
+/// the least shift is that of noise.
+const FLAT: f64 = 0.01;
 
 /// What a picture is, compared with the reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,7 +75,22 @@ pub fn find(picture: &Image, truth: &Reference) -> Option<Finding> {
     let scale = scale(&picture, &mean, w, h, level)?;
     // Lamps, a hundred times as bright as all else, would be the only edges that count.
     let cut = |v: &[f64], factor: f64| v.iter().map(|y| (y * factor).min(2.0 * level)).collect::<Vec<f64>>();
-    Some(Finding { scale, shift: shift(&cut(&picture, 1.0 / scale), &cut(&mean, 1.0), w, h) })
+    let (a, b) = truth.halves.as_ref().map_or((&truth.mean, &truth.mean), |(a, b)| (a, b));
+    let (a, b) = (cut(&luminance(a), 1.0), cut(&luminance(b), 1.0));
+    let shift = (slope(&a, &b, w, h) > FLAT * level)
+        .then(|| shift(&cut(&picture, 1.0 / scale), &cut(&mean, 1.0), w, h))
+        .flatten();
+    Some(Finding { scale, shift })
+}
+
+/// Root mean square step from a pixel to the one right of it and to the one below; the noise of two independent halves
+/// `a` and `b` of a picture does not count.
+fn slope(a: &[f64], b: &[f64], w: usize, h: usize) -> f64 {
+    let step = |v: &[f64], i: usize, to: usize| v[to] - v[i];
+    let inner = (0..h.saturating_sub(1)).flat_map(|y| (0..w.saturating_sub(1)).map(move |x| y * w + x));
+    let products =
+        inner.map(|i| [i + 1, i + w].map(|to| step(a, i, to) * step(b, i, to)).iter().sum::<f64>());
+    (products.sum::<f64>() / (2 * w * h).max(1) as f64).max(0.0).sqrt()
 }
 
 /// The median over blocks, of those not darker than a hundredth of the brightness `level`, of the ratio of means.
@@ -131,6 +149,24 @@ mod tests {
     use geometry::Rgb;
 
     const SIZE: u32 = 96;
+
+    /// A white picture whose noise happens to be that of the reference, a pixel to the right, is not shifted.
+    #[test]
+    fn noise_that_both_share_is_no_shift() {
+        let noise = |x: u32, y: u32, k: u32| {
+            let hash = (x * 73_856_093) ^ (y * 19_349_663) ^ (k * 83_492_791);
+            ((hash.wrapping_mul(2_654_435_761) >> 16) & 0xff) as f32 / 255.0 - 0.5
+        };
+        let flat = |moved: u32, k: u32| {
+            let pixel = |i: u32| Rgb::splat(1.0 + 0.04 * noise(i % SIZE + moved, i / SIZE, k));
+            Image { width: SIZE, height: SIZE, pixels: (0..SIZE * SIZE).map(pixel).collect() }
+        };
+        let (a, b) = (flat(0, 1), flat(0, 2));
+        let mean = a.pixels.iter().zip(&b.pixels).map(|(&a, &b)| (a + b) * 0.5).collect();
+        let truth = Reference { mean: Image { pixels: mean, ..a.clone() }, halves: Some((a, b)) };
+        let found = find(&flat(1, 1), &truth).unwrap();
+        assert!(found.is_sane() && found.shift.is_none(), "{found:?}");
+    }
 
     /// A room of tilted edges and a lamp, drawn at `offset` pixels, box-filtered, with noise of the share `noise`.
     fn room(offset: [f64; 2], factor: f64, noise: f64) -> Image {
