@@ -238,6 +238,7 @@ impl Ladder {
     fn new(settings: &Settings) -> Ladder {
         let error = settings.error;
         let steps = |base: f32| 4u32.pow((base / error).log(4.0).ceil().clamp(1.0, 6.0) as u32);
+        // Half of the error asked: the first pass has errors too, and in simple rooms takes most of the time.
         Ladder {
             target: error / 2.0,
             most_camera: settings.samples.map_or(steps(2.4), |n| n.max(1)),

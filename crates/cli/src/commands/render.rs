@@ -66,18 +66,15 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
         }
         let mut outcome = render(&world, camera, solution.as_ref(), &settings, &bars)?;
         outcome.report.stages.splice(0..0, shared.drain(..));
-        lap(&mut clock);
+        let rays = world.bvh.rays_cast();
+        let rays = rays - std::mem::replace(&mut rays_before, rays);
         bars.done();
         if !outcome.finished && outcome.film.is_blank() {
             // An old picture is worth more than a black one.
             let why = if bars.interrupted() { "stopped" } else { "the time was up" };
             anyhow::bail!("{why} before a pixel was rendered: {} is not written", output.display());
         }
-        let mut picture = save(&job, camera, &settings, outcome, output, preview)?;
-        picture.stages.insert("write", lap(&mut clock));
-        picture.seconds = picture.stages.values().sum();
-        let rays = world.bvh.rays_cast();
-        picture.rays = rays - std::mem::replace(&mut rays_before, rays);
+        let picture = save(&job, camera, &settings, outcome, output, preview, rays)?;
         if picture.repaired > 0 {
             let message = "pixels were not finite or negative and are black instead; please report it";
             bars.note(&format!("warning: {} {message}", picture.repaired));
@@ -159,7 +156,9 @@ fn save(
     outcome: Outcome,
     output: PathBuf,
     preview: Option<PathBuf>,
+    rays: u64,
 ) -> Result<Picture> {
+    let started = Instant::now();
     let Outcome { film, finished, report } = outcome;
     exr::write(&film, &metadata(camera, settings, finished, &report.texts), &output)?;
     let mut exposure = None;
@@ -169,6 +168,8 @@ fn save(
         tonemap::write_png(film.width, film.height, &tonemap::to_srgb(&beauty, ev), path)?;
         exposure = Some(ev);
     }
+    let mut stages: BTreeMap<_, _> = report.stages.into_iter().collect();
+    stages.insert("write", started.elapsed().as_secs_f64());
     Ok(Picture {
         output,
         preview,
@@ -176,9 +177,9 @@ fn save(
         width: film.width,
         height: film.height,
         finished,
-        seconds: 0.0,
-        rays: 0,
-        stages: report.stages.into_iter().collect(),
+        seconds: stages.values().sum(),
+        rays,
+        stages,
         exposure,
         repaired: film.repaired,
         report: report.texts.into_iter().collect(),
