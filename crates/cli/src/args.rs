@@ -12,7 +12,7 @@ use std::time::Duration;
     version,
     arg_required_else_help = true,
     after_help = "Results go to stdout, progress and warnings to stderr.\n\
-                  Exit status: 0 done, 1 failed, 2 asked wrongly.\n\n\
+                  Exit status: 0 done, 1 failed, 2 asked wrongly, 3 written but not as exact as asked.\n\n\
                   Start with:\n  \
                   twolight inspect room.glb\n  \
                   twolight render room.glb -o room.exr --preview room.png"
@@ -97,6 +97,9 @@ pub struct RenderArgs {
     /// Rays through each pixel, in place of what --error asks for
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Methods")]
     pub samples: Option<u32>,
+    /// Do not measure the picture's error by probes, nor go on where it is missed
+    #[arg(long)]
+    pub no_verify: bool,
     /// Seed of all random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,

@@ -78,8 +78,8 @@ pub struct Diffuse {
     pub glossy: Rgb,
     /// All irradiance, lx.
     pub irradiance: Rgb,
-    /// Visible share of the unshadowed direct light.
-    pub visible: f32,
+    /// Of it, what comes straight from emitters by way of shadow rays.
+    pub straight: Rgb,
     /// Estimated variance of the luminance from shadow rays.
     pub variance: f32,
     /// The same from a gather.
@@ -115,7 +115,7 @@ impl Hybrid<'_> {
             direct: lit.diffuse,
             glossy: lit.glossy,
             irradiance: lit.irradiance,
-            visible: lit.visible,
+            straight: lit.irradiance,
             variance: lit.variance,
             ..Diffuse::default()
         };
@@ -129,7 +129,7 @@ impl Hybrid<'_> {
         if from_vertices {
             let e = self.solution.direct(self.world, t, u, v, side);
             out.direct = photometry::reflected_radiance(albedo, e);
-            out.irradiance = e;
+            (out.irradiance, out.straight) = (e, Rgb::BLACK);
             out.variance = 0.0;
         }
         let gathers = match self.mode {
