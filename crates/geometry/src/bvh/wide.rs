@@ -16,6 +16,11 @@ const DEEP: u32 = 24;
 /// 2³² triangles down to blocks takes 30 binary levels; each level of wide nodes undoes at least one.
 pub(super) const STACK: usize = (DEEP as usize + 30) * (WIDTH - 1) + 1;
 
+/// By how much a box, and the origin of a ray, are widened, relative to each coordinate: 8 units of rounding. Two
+/// take the slab test's own roundings (of the reciprocal and the result), four those of the triangle test's shear,
+/// so that no box is missed whose triangle is met.
+pub(super) const WIDEN: f32 = 4.0 * f32::EPSILON;
+
 /// Eight boxes: `bounds[0]` the least corners, `bounds[1]` the greatest, each by axis, then by child.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
@@ -103,8 +108,8 @@ impl Node {
 
     fn set(&mut self, lane: usize, bounds: &binary::Bounds, child: u32) {
         for axis in 0..3 {
-            self.bounds[0][axis][lane] = bounds.lo[axis];
-            self.bounds[1][axis][lane] = bounds.hi[axis];
+            self.bounds[0][axis][lane] = bounds.lo[axis] - WIDEN * bounds.lo[axis].abs();
+            self.bounds[1][axis][lane] = bounds.hi[axis] + WIDEN * bounds.hi[axis].abs();
         }
         self.child[lane] = child;
     }
@@ -112,8 +117,10 @@ impl Node {
 
 impl Block {
     fn new(mesh: &Mesh, triangles: &[u32]) -> Block {
+        let mut triangles = triangles.to_vec();
+        triangles.sort_unstable();
         let mut block = Block { corners: [[[0.0; LANES]; 3]; 3], triangle: [u32::MAX; LANES] };
-        for (lane, &t) in triangles.iter().enumerate() {
+        for (lane, t) in triangles.into_iter().enumerate() {
             block.triangle[lane] = t;
             for (corner, p) in mesh.corners(t).into_iter().enumerate() {
                 for axis in 0..3 {
