@@ -1,17 +1,17 @@
 //! Emissive surfaces: a plane convex polygon that shines, and how one draws a point on it.
 
-use super::merge::MAX_CORNERS;
 use super::spherical::SphericalTriangle;
 use crate::Rgb;
 use crate::math::{Vec2, Vec3, to_world};
 use crate::polygon::polygon_irradiance;
 use crate::sampling;
+use glam::DVec3;
 use std::f32::consts::PI;
 
 /// A plane convex polygon that shines with one radiance, or one triangle whose texture shines unevenly.
 #[derive(Clone, Debug)]
 pub struct PolygonLight {
-    /// Corners, counter-clockwise as seen from the front; metres. 3 to [`MAX_CORNERS`].
+    /// Corners, counter-clockwise as seen from the front; metres. 3 to [`MAX_CORNERS`](super::merge::MAX_CORNERS).
     pub vertices: Vec<Vec3>,
     /// Unit normal on the front.
     pub normal: Vec3,
@@ -95,6 +95,7 @@ impl PolygonLight {
     }
 
     /// The polygon as `p` sees it; `None` where it sends no light there.
+    #[inline]
     pub fn seen_from(&self, p: Vec3) -> Option<Seen<'_>> {
         let way = self.centre - p;
         let d2 = way.length_squared();
@@ -191,8 +192,7 @@ impl Seen<'_> {
 /// The triangles of a polygon around its first corner, as a point sees them.
 #[derive(Clone, Debug)]
 struct Fan {
-    triangles: [SphericalTriangle; MAX_CORNERS - 2],
-    count: usize,
+    triangles: Vec<SphericalTriangle>,
     /// Of all, sr.
     solid_angle: f64,
 }
@@ -203,24 +203,22 @@ impl Fan {
         let way = |v: Vec3| (v.as_dvec3() - p).normalize_or_zero();
         let first = way(vertices[0]);
         let mut from = way(vertices[1]);
-        let mut fan =
-            Fan { triangles: [SphericalTriangle::default(); MAX_CORNERS - 2], count: 0, solid_angle: 0.0 };
-        for &v in vertices[2..].iter().take(MAX_CORNERS - 2) {
+        let mut fan = Fan { triangles: Vec::with_capacity(vertices.len() - 2), solid_angle: 0.0 };
+        for &v in &vertices[2..] {
             let to = way(v);
             let triangle = SphericalTriangle::new(first, from, to);
             if triangle.solid_angle > 0.0 {
-                fan.triangles[fan.count] = triangle;
-                fan.count += 1;
                 fan.solid_angle += triangle.solid_angle;
+                fan.triangles.push(triangle);
             }
             from = to;
         }
         fan
     }
 
-    fn sample(&self, u: [f32; 2]) -> Option<glam::DVec3> {
+    fn sample(&self, u: [f32; 2]) -> Option<DVec3> {
         let mut left = f64::from(u[0]) * self.solid_angle;
-        let (last, before) = self.triangles[..self.count].split_last()?;
+        let (last, before) = self.triangles.split_last()?;
         for t in before {
             if left < t.solid_angle {
                 return Some(t.sample([left / t.solid_angle, f64::from(u[1])]));

@@ -128,6 +128,7 @@ impl Emitters {
     }
 
     /// One light as `p` sees it; `None` where a surface sends no light there.
+    #[inline]
     pub fn seen_from(&self, light: u32, p: Vec3) -> Option<SeenLight<'_>> {
         let kind = self.lights.get(light as usize)?;
         let surface = match kind {
@@ -170,6 +171,7 @@ pub struct SeenLight<'a> {
 
 impl SeenLight<'_> {
     /// A way to the light, the pdf without the probability of choosing it; `u` in [0, 1)². `None` where it sends none.
+    #[inline]
     pub fn sample(&self, scene: &Scene, u: [f32; 2]) -> Option<LightSample> {
         let SeenLight { light, p, .. } = *self;
         match (self.kind, &self.surface) {
