@@ -294,7 +294,7 @@ fn pooled(
             u -= e.chance;
             u < 0.0
         });
-        let Some(&Entry { group, chance, .. }) = chosen.or_else(|| small().last()) else { return };
+        let Some(&Entry { group, chance, .. }) = chosen.or_else(|| small().next_back()) else { return };
         let u = [rng.f32(), rng.f32()];
         match world.emitters.sample_group(&world.scene, group, surface.position, surface.ns, u) {
             Some(s) => {
