@@ -215,27 +215,27 @@ fn percent(squares: impl Iterator<Item = f64>, of: usize) -> f64 {
 
 fn judge(world: &World, places: &[Place], truth: &[Truth], found: &[Vec<Rgb>], open: &[bool]) {
     let n = places.len();
+    let (k, flagged) = (found.len() as f64, open.iter().filter(|o| **o).count());
     let each: Vec<Vec<f64>> = found.iter().map(|e| squares(world, places, truth, e)).collect();
-    let all = percent(each.iter().flatten().copied(), n * found.len());
-    let trusted: f64 = percent(
-        each.iter().flat_map(|s| s.iter().zip(open)).filter(|(_, open)| !**open).map(|(s, _)| *s),
-        n * found.len(),
-    );
-    let mean: Vec<Rgb> = (0..n)
-        .map(|i| found.iter().map(|e| e[i]).sum::<Rgb>() / found.len() as f32)
-        .collect();
-    let bias = percent(squares(world, places, truth, &mean).into_iter(), n);
-    let worst = {
-        let mut s: Vec<f64> = each.iter().flatten().copied().collect();
-        s.sort_by(f64::total_cmp);
-        100.0 * s[s.len() * 99 / 100].max(0.0).sqrt()
-    };
-    let k = found.len() as f64;
-    let noise = ((all * all - bias * bias) * k / (k - 1.0).max(1.0)).max(0.0).sqrt();
-    let bias = (all * all - noise * noise).max(0.0).sqrt();
+    let mean: Vec<Rgb> =
+        (0..n).map(|i| found.iter().map(|e| e[i]).sum::<Rgb>() / found.len() as f32).collect();
+    let of_mean = squares(world, places, truth, &mean);
+    for (what, which) in [("trusted", false), ("flagged", true)] {
+        let some = |s: &Vec<f64>| percent((0..n).filter(|&i| open[i] == which).map(|i| s[i]), n).powi(2);
+        let all = each.iter().map(some).sum::<f64>() / k;
+        let noise = (all - some(&of_mean)).max(0.0) * k / (k - 1.0).max(1.0);
+        let bias = (all - noise).max(0.0);
+        let [all, noise, bias] = [all, noise, bias].map(f64::sqrt);
+        println!("  {what}: error of E in the picture {all:.2} %: noise {noise:.2} %, bias {bias:.2} %");
+    }
+    let mut sorted: Vec<f64> = each.concat();
+    sorted.sort_by(f64::total_cmp);
+    let at = |q: f64| 100.0 * sorted[((sorted.len() as f64 * q) as usize).min(sorted.len() - 1)].max(0.0).sqrt();
     println!(
-        "  error of E in the picture {all:.2} % (outside flagged leaves {trusted:.2} %, 99th percentile {worst:.1} %); noise {noise:.2} %, bias {bias:.2} %; {:.1} % of the points flagged",
-        100.0 * open.iter().filter(|o| **o).count() as f64 / n as f64
+        "  90th percentile {:.1} %, 99th {:.1} %; {:.1} % of the points flagged",
+        at(0.9),
+        at(0.99),
+        100.0 * flagged as f64 / n as f64
     );
 }
 

@@ -33,6 +33,7 @@ pub mod gather;
 pub mod reach;
 pub mod refine;
 mod sites;
+mod smooth;
 pub mod solution;
 pub mod solver;
 pub mod transport;

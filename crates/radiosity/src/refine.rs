@@ -51,6 +51,17 @@ pub(crate) struct Refiner<'a> {
     pub(crate) radius: f32,
 }
 
+/// What solving on the present mesh gave.
+pub(crate) struct Solved {
+    /// E at the sites, lx.
+    pub(crate) e: Vec<Rgb>,
+    /// Estimated variance of each (mean of the channels), lx².
+    pub(crate) variance: Vec<f32>,
+    pub(crate) convergence: Convergence,
+    /// ‖K‖∞.
+    pub(crate) norm: f32,
+}
+
 /// A vertex gathered to be compared with a prediction.
 struct Test {
     vertex: VertexId,
@@ -210,16 +221,16 @@ impl<'a> Refiner<'a> {
         room: usize,
     ) -> (Vec<((VertexId, VertexId), [bool; 2])>, Vec<(VertexId, VertexId)>, Vec<Member>) {
         // Two ends that agree may still hide a bend between them: a tenth of what is there, and of what is elsewhere on
-        // this side of the piece. So a panel of which most corners lie dark behind a frame is looked at too.
+        // this side of the face. So a panel of which most corners lie dark behind a frame is looked at too.
         const HIDDEN: f32 = 0.1;
         let values = self.field.spread(&self.e);
         let floor = 0.1 * mean(&self.e).mean();
-        let elsewhere = self.means_of_pieces();
+        let elsewhere = self.means_of_faces();
         let promise =
-            |difference: f32, level: f32, slot: usize| match level + elsewhere[self.piece_slot(slot)] {
+            |difference: f32, level: f32, slot: usize| match level + elsewhere[self.face_slot(slot)] {
                 // Without indirect light there may be the direct one, for those who take it from the vertices.
                 0.0 => {
-                    if self.reach.shone_on(self.elements.vertices[slot / 2].piece, Side::BOTH[slot % 2]) {
+                    if self.reach.shone_on(self.elements.vertices[slot / 2].face, Side::BOTH[slot % 2]) {
                         HIDDEN
                     } else {
                         0.0
@@ -228,9 +239,9 @@ impl<'a> Refiner<'a> {
                 around => (difference + HIDDEN * around) / (level + floor),
             };
         let change = |a: VertexId, b: VertexId| {
-            let piece = self.elements.vertices[a as usize].piece;
+            let face = self.elements.vertices[a as usize].face;
             Side::BOTH.map(|side| {
-                if !self.reach.alive(piece, side) {
+                if !self.reach.alive(face, side) {
                     return 0.0;
                 }
                 let (sa, sb) = (slot(a, side), slot(b, side));
@@ -273,19 +284,19 @@ impl<'a> Refiner<'a> {
         )
     }
 
-    /// Mean E of each side of each piece, lx, over its sites.
-    fn means_of_pieces(&self) -> Vec<f32> {
-        let mut sums = vec![(0.0, 0u32); 2 * self.elements.pieces as usize];
+    /// Mean E of each side of each face, lx, over its sites.
+    fn means_of_faces(&self) -> Vec<f32> {
+        let mut sums = vec![(0.0, 0u32); 2 * self.elements.faces as usize];
         for (site, e) in self.field.sites.iter().zip(&self.e) {
-            let sum = &mut sums[self.piece_slot(slot(site.vertex, site.side))];
+            let sum = &mut sums[self.face_slot(slot(site.vertex, site.side))];
             *sum = (sum.0 + e.mean(), sum.1 + 1);
         }
         sums.into_iter().map(|(sum, n)| sum / n.max(1) as f32).collect()
     }
 
-    /// Number of the side of a piece that a slot lies on.
-    fn piece_slot(&self, slot: usize) -> usize {
-        2 * self.elements.vertices[slot / 2].piece as usize + slot % 2
+    /// Number of the side of a face that a slot lies on.
+    fn face_slot(&self, slot: usize) -> usize {
+        2 * self.elements.vertices[slot / 2].face as usize + slot % 2
     }
 
     /// Relative difference of what was gathered from what was predicted, the worse side.
@@ -340,7 +351,7 @@ impl<'a> Refiner<'a> {
     /// Whether something stands on the edge from `a` to `b`, on a side that light reaches.
     fn parted(&self, a: VertexId, b: VertexId) -> bool {
         let (a, b) = (&self.elements.vertices[a as usize], &self.elements.vertices[b as usize]);
-        Side::BOTH.iter().filter(|&&side| self.reach.alive(a.piece, side)).any(|&side| {
+        Side::BOTH.iter().filter(|&&side| self.reach.alive(a.face, side)).any(|&side| {
             let lift = 1e-4 * self.world.scale * side.sign();
             let (from, to) = (a.position + a.normal * lift, b.position + b.normal * lift);
             let length = from.distance(to);
@@ -369,7 +380,7 @@ impl<'a> Refiner<'a> {
             let node = &self.elements.nodes[leaf as usize];
             let corners = self.elements.corners(leaf);
             let piece = self.elements.vertices[node.vertices[0] as usize].piece;
-            let lit = Side::BOTH.iter().any(|&side| self.reach.alive(piece, side));
+            let lit = Side::BOTH.iter().any(|&side| self.reach.alive(self.elements.face_of(leaf), side));
             if !lit || !self.diffuse[piece as usize] {
                 continue;
             }
@@ -388,7 +399,9 @@ impl<'a> Refiner<'a> {
     /// Solves on what there is, roughly: for predictions, not for pictures.
     fn settle(&mut self) {
         let tolerance = 0.02 * mean(&self.e).mean();
-        self.e = self.solved(tolerance, 12, &[], &Flags::default()).0;
+        let settled = self.solved(tolerance, 12, &[], &Flags::default());
+        self.e = settled.e;
+        self.field.sites.iter_mut().zip(settled.variance).for_each(|(site, v)| site.variance = v);
     }
 
     /// Solves E = D + K (E + extra) to `tolerance` lx from the present E, in at most `most` steps; also ‖K‖∞.
@@ -398,7 +411,7 @@ impl<'a> Refiner<'a> {
         most: u32,
         extra: &[Rgb],
         flags: &Flags,
-    ) -> (Vec<Rgb>, Convergence, f32) {
+    ) -> Solved {
         let usable = |s: usize| self.field.usable(s);
         let transport = Transport::locate(&self.elements, &self.field, |node, side, w| {
             visible_weights(self.world, &self.elements, flags, usable, node, side, w)
@@ -411,7 +424,8 @@ impl<'a> Refiner<'a> {
         };
         let (e, convergence) =
             solver::solve(self.e.clone(), gain, tolerance, most, |e| transport.apply(e, extra));
-        (e, convergence, norm)
+        let variance = transport.variance(&e);
+        Solved { e, variance, convergence, norm }
     }
 
     /// Where pass 2 should gather for itself.
@@ -422,7 +436,7 @@ impl<'a> Refiner<'a> {
         }
         Flags::collect(&self.elements, |n, side| {
             let corners = self.elements.nodes[n as usize].vertices;
-            if !self.reach.alive(self.elements.vertices[corners[0] as usize].piece, side) {
+            if !self.reach.alive(self.elements.vertices[corners[0] as usize].face, side) {
                 return (false, false);
             }
             // Of a leaf with all corners in other things (a shelf between books) the mesh knows nothing.

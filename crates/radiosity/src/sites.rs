@@ -22,7 +22,7 @@ impl Refiner<'_> {
             .flat_map(|&(v, sides)| Side::BOTH.map(|side| (v, side, sides[side.index()])))
             .filter(|&(.., wanted)| wanted)
             .map(|(v, side, _)| (v, side))
-            .filter(|&(v, side)| self.reach.alive(self.elements.vertices[v as usize].piece, side))
+            .filter(|&(v, side)| self.reach.alive(self.elements.vertices[v as usize].face, side))
             .filter(|(v, _)| origins.contains_key(v))
             .collect();
         let mut rays = self.config.rays;
@@ -43,7 +43,7 @@ impl Refiner<'_> {
             }
         }
         self.e.extend(rows.iter().map(|row| row.direct));
-        let sites = jobs.into_iter().zip(rows).map(|((vertex, side), row)| Site { vertex, side, row });
+        let sites = jobs.into_iter().zip(rows).map(|((vertex, side), row)| Site { vertex, side, variance: row.variance, row });
         self.field.sites.extend(sites);
         self.field.connect(self.world, &self.elements, self.radius);
     }
@@ -60,7 +60,7 @@ impl Refiner<'_> {
         let pattern = Lattice2::new(rays.min(room as u32).max(16));
         self.progress.stage("gathering", jobs.len() as u64);
         let dead =
-            |t: u32, side: Side| self.elements.piece(t).is_none_or(|piece| !self.reach.alive(piece, side));
+            |t: u32, side: Side| self.elements.face(t).is_none_or(|face| !self.reach.alive(face, side));
         jobs.par_iter()
             .map(|&(vertex, side)| {
                 let turned = turned(&origins[&vertex], side);
@@ -108,8 +108,8 @@ impl Refiner<'_> {
         let normals = vertices.map(|v| self.elements.vertices[v as usize].normal);
         let smooth = (normals[0] + normals[1] + normals[2]).normalize_or(ng);
         let dead =
-            |t: u32, side: Side| self.elements.piece(t).is_none_or(|piece| !self.reach.alive(piece, side));
-        Side::BOTH.iter().filter(|&&side| self.reach.alive(self.elements.piece_of(leaf) as u32, side)).any(
+            |t: u32, side: Side| self.elements.face(t).is_none_or(|face| !self.reach.alive(face, side));
+        Side::BOTH.iter().filter(|&&side| self.reach.alive(self.elements.face_of(leaf), side)).any(
             |&side| {
                 let origins = [Origin { position: middle, ng: ng * side.sign() }];
                 let stream = (1 << 62) | slot(leaf, side) as u64;

@@ -1,7 +1,8 @@
 //! The whole prepass: mesh, gather, refine, photons, solve.
 
 use crate::caustic::Caustics;
-use crate::refine::{Refiner, mean};
+use crate::refine::{Refiner, Solved, mean};
+use crate::smooth;
 use crate::solution::{Report, Solution};
 use geometry::World;
 use thiserror::Error;
@@ -110,11 +111,14 @@ pub fn solve(world: &World, config: &Config, progress: &dyn Progress) -> Result<
     progress.stage("solving", 1);
     let flags = refiner.flags();
     let tolerance = config.solve_tolerance * mean(&refiner.e).mean();
-    let (e, convergence, norm) = refiner.solved(tolerance, 500, &extra, &flags);
+    let Solved { e, variance, convergence, norm } = refiner.solved(tolerance, 500, &extra, &flags);
     if !e.iter().all(|e| e.is_finite()) {
         return Err(Error::Diverged { iterations: convergence.iterations, norm });
     }
     refiner.e = e;
+    if std::env::var("NOSMOOTH").is_err() {
+        refiner.e = smooth::smoothed(&refiner, &flags, &variance);
+    }
     let direct = refiner.direct(config.light_samples);
     let report = Report::new(world, &refiner, &flags, &extra, &direct, convergence, norm, &caustics);
     Ok(Solution::new(refiner, flags, extra, direct, caustics, report))

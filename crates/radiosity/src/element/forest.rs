@@ -33,6 +33,8 @@ pub struct Elements {
     pub nodes: Vec<Node>,
     /// Number of pieces of connected surface.
     pub pieces: u32,
+    /// Number of faces.
+    pub faces: u32,
 }
 
 /// Edges to split, with the midpoint each has got (or `VertexId::MAX` before it has).
@@ -105,7 +107,8 @@ impl Elements {
             })
             .collect();
         let pieces = welded.vertices.iter().map(|v| v.piece + 1).max().unwrap_or(0);
-        Elements { vertices: welded.vertices, nodes, pieces }
+        let faces = welded.vertices.iter().map(|v| v.face + 1).max().unwrap_or(0);
+        Elements { vertices: welded.vertices, nodes, pieces, faces }
     }
 
     /// Indices of the leaves, in order.
@@ -159,6 +162,17 @@ impl Elements {
     pub fn piece(&self, t: u32) -> Option<u32> {
         let v = self.nodes[t as usize].vertices[0];
         (v != VertexId::MAX).then(|| self.vertices[v as usize].piece)
+    }
+
+    /// The face that scene triangle `t` belongs to; `None` for one without area.
+    pub fn face(&self, t: u32) -> Option<u32> {
+        let v = self.nodes[t as usize].vertices[0];
+        (v != VertexId::MAX).then(|| self.vertices[v as usize].face)
+    }
+
+    /// The face that a leaf belongs to.
+    pub fn face_of(&self, leaf: u32) -> u32 {
+        self.vertices[self.nodes[leaf as usize].vertices[0] as usize].face
     }
 
     /// The piece of surface that a leaf belongs to.
@@ -221,7 +235,8 @@ impl Elements {
             let (a, b) = (self.vertices[p as usize], self.vertices[q as usize]);
             *entry = self.vertices.len() as VertexId;
             let normal = (a.normal + b.normal).normalize_or(a.normal);
-            self.vertices.push(Vertex { position: 0.5 * (a.position + b.position), normal, piece: a.piece });
+            let position = 0.5 * (a.position + b.position);
+            self.vertices.push(Vertex { position, normal, ..a });
         }
         *entry
     }

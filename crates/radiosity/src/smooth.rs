@@ -1,0 +1,178 @@
+//! Less noise in E: where the light changes evenly, neighbouring sites lend one another their rays.
+//!
+//! Each site's value becomes the local linear fit to the sites around it (Fan and Gijbels, "Local Polynomial Modelling
+//! and Its Applications", 1996, section 3.2), as far around as the fits agree within their noise: Lepski's rule (Theory
+//! Probab. Appl. 35, 1991). What the rays cannot tell from even light is treated as even; what they can stays.
+
+use crate::element::{Side, slot};
+use crate::field::Field;
+use crate::flags::Flags;
+use crate::refine::Refiner;
+use geometry::math::frame;
+use geometry::{Rgb, Vec3};
+use rayon::prelude::*;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// Sites that the fits reach over, one after the other.
+const REACHES: [usize; 4] = [7, 12, 20, 34];
+/// A fit is believed when it is no further than so many standard deviations from every smaller one.
+const AGREE: f32 = 1.5; // tuned below
+/// Normals further apart than this (cosine) look at other things.
+const ALIKE: f32 = 0.95;
+
+/// Neighbours of every site across the leaves, in CSR form.
+struct Graph {
+    starts: Vec<u32>,
+    neighbours: Vec<u32>,
+}
+
+impl Graph {
+    /// Sites are neighbours when they speak for corners of one leaf that nothing pierces and the mesh resolves.
+    fn new(refiner: &Refiner, flags: &Flags) -> Graph {
+        let (elements, field) = (&refiner.elements, &refiner.field);
+        let mut pairs: Vec<(u32, u32)> = Vec::new();
+        for leaf in elements.leaves() {
+            let corners = elements.nodes[leaf as usize].vertices;
+            for side in Side::BOTH {
+                if flags.pierced(leaf, side) || flags.unresolved(leaf, side) {
+                    continue;
+                }
+                let sites = corners.map(|v| field.loudest(slot(v, side)));
+                for (a, b) in [(0, 1), (1, 2), (2, 0)] {
+                    if let (Some(a), Some(b)) = (sites[a], sites[b])
+                        && a != b
+                    {
+                        pairs.extend([(a, b), (b, a)]);
+                    }
+                }
+            }
+        }
+        pairs.par_sort_unstable();
+        pairs.dedup();
+        let mut starts = vec![0u32; field.sites.len() + 1];
+        for &(a, _) in &pairs {
+            starts[a as usize + 1] += 1;
+        }
+        for i in 1..starts.len() {
+            starts[i] += starts[i - 1];
+        }
+        Graph { starts, neighbours: pairs.into_iter().map(|p| p.1).collect() }
+    }
+
+    fn of(&self, site: u32) -> &[u32] {
+        let range = self.starts[site as usize] as usize..self.starts[site as usize + 1] as usize;
+        &self.neighbours[range]
+    }
+}
+
+/// E at the sites with less noise: see the head of this file.
+///
+/// - `variance`: of each site's value (mean of the channels), lx².
+pub(crate) fn smoothed(refiner: &Refiner, flags: &Flags, variance: &[f32]) -> Vec<Rgb> {
+    let graph = Graph::new(refiner, flags);
+    // A site's own rays are poor witnesses of their noise: those that missed the bright patch know nothing of it. What
+    // its neighbours saw counts as well.
+    let pooled: Vec<f32> = (0..refiner.e.len() as u32)
+        .map(|site| {
+            let near = || std::iter::once(site).chain(graph.of(site).iter().copied());
+            near().map(|s| variance[s as usize]).sum::<f32>() / near().count() as f32
+        })
+        .collect();
+    (0..refiner.e.len() as u32)
+        .into_par_iter()
+        .map(|site| fit(refiner, &refiner.field, &graph, &pooled, site))
+        .collect()
+}
+
+/// The site's value by the widest fit that agrees with the narrower ones.
+fn fit(refiner: &Refiner, field: &Field, graph: &Graph, variance: &[f32], site: u32) -> Rgb {
+    let own = refiner.e[site as usize];
+    let around = around(refiner, field, graph, site);
+    let at = |s: u32| &refiner.elements.vertices[field.sites[s as usize].vertex as usize];
+    let here = at(site);
+    let (tangent, bitangent) = frame(here.normal);
+    // The least noise that is taken for real: where rays found none there is nothing to mend.
+    let agree = std::env::var("AGREE").map_or(AGREE, |a| a.parse().unwrap());
+    let mut believed = own;
+    // Every fit so far: its value (mean of the channels) and variance.
+    let mut fits: Vec<(f32, f32)> = vec![(own.mean(), variance[site as usize])];
+    for reach in REACHES {
+        let Some(&(edge, _)) = around.get(reach) else { break };
+        let near = &around[..reach];
+        let r = edge.max(1e-12);
+        // Normal equations of E ≈ a + b x + c y.
+        let mut m = [[0f64; 3]; 3];
+        let mut rows: Vec<(u32, f64, [f64; 3])> = Vec::with_capacity(reach);
+        for &(d, s) in near {
+            let way = (at(s).position - here.position) / r;
+            let x = [1.0, f64::from(way.dot(tangent)), f64::from(way.dot(bitangent))];
+            let kernel = 1.0 - f64::from(d / r).powi(2);
+            let noise = f64::from(variance[s as usize] + 0.25 * variance[site as usize]).max(1e-30);
+            let w = kernel / noise;
+            for i in 0..3 {
+                for j in 0..3 {
+                    m[i][j] += w * x[i] * x[j];
+                }
+            }
+            rows.push((s, w, x));
+        }
+        let Some(first) = first_row_of_inverse(m) else { continue };
+        let weight = |w: f64, x: &[f64; 3]| w * (first[0] * x[0] + first[1] * x[1] + first[2] * x[2]);
+        let value: Rgb = rows.iter().map(|(s, w, x)| refiner.e[*s as usize] * weight(*w, x) as f32).sum();
+        let noise: f64 =
+            rows.iter().map(|(s, w, x)| weight(*w, x).powi(2) * f64::from(variance[*s as usize])).sum();
+        let noise = noise as f32;
+        let agrees = |&(mean, v): &(f32, f32)| {
+            (value.mean() - mean).powi(2) <= agree * agree * (v - noise).max(0.1 * v)
+        };
+        if !fits.iter().all(agrees) || !value.is_finite() {
+            break;
+        }
+        fits.push((value.mean(), noise));
+        believed = value;
+    }
+    if std::env::var("DBG").is_ok() {
+        let p = here.position;
+        eprintln!("DBG {} {} {} {} {} {} {} {} {:?}", p.x, p.y, p.z, here.normal.y * field.sites[site as usize].side.sign(), own.mean(), variance[site as usize].sqrt(), field.sites[site as usize].row.variance.sqrt(), field.sites[site as usize].row.rays, fits.iter().map(|f|f.0).collect::<Vec<_>>());
+    }
+    believed.max(Rgb::BLACK)
+}
+
+/// The site and those around it that face alike, by distance (m), as far as they hang together; enough for the widest fit.
+fn around(refiner: &Refiner, field: &Field, graph: &Graph, site: u32) -> Vec<(f32, u32)> {
+    let at = |s: u32| &refiner.elements.vertices[field.sites[s as usize].vertex as usize];
+    let most = REACHES[REACHES.len() - 1] + 1;
+    let here = at(site);
+    let mut found: Vec<(f32, u32)> = Vec::with_capacity(most);
+    let mut seen = vec![site];
+    let mut open = BinaryHeap::new();
+    // Distances are positive, so that their bits are in their order.
+    open.push(Reverse((0u32, site)));
+    while let Some(Reverse((bits, s))) = open.pop() {
+        found.push((f32::from_bits(bits), s));
+        if found.len() >= most {
+            break;
+        }
+        for &next in graph.of(s) {
+            if seen.contains(&next) {
+                continue;
+            }
+            seen.push(next);
+            if at(next).normal.dot(here.normal) >= ALIKE {
+                let d: Vec3 = at(next).position - here.position;
+                open.push(Reverse((d.length().to_bits(), next)));
+            }
+        }
+    }
+    found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    found
+}
+
+/// First row of the inverse of a symmetric matrix; none when it is (nearly) singular, as for sites in one line.
+fn first_row_of_inverse(m: [[f64; 3]; 3]) -> Option<[f64; 3]> {
+    let minor = |a: usize, b: usize, c: usize, d: usize| m[1][a] * m[2][b] - m[1][c] * m[2][d];
+    let cofactors = [minor(1, 2, 2, 1), -minor(0, 2, 2, 0), minor(0, 1, 1, 0)];
+    let determinant = m[0][0] * cofactors[0] + m[0][1] * cofactors[1] + m[0][2] * cofactors[2];
+    (determinant > 1e-6 * m[0][0] * m[0][0] * m[0][0]).then(|| cofactors.map(|c| c / determinant))
+}
