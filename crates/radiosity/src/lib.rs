@@ -30,6 +30,7 @@ pub mod element;
 pub mod field;
 pub mod flags;
 pub mod gather;
+pub mod importance;
 pub mod reach;
 pub mod refine;
 mod sites;
@@ -40,5 +41,6 @@ pub mod transport;
 
 mod solve;
 
+pub use importance::Importance;
 pub use solution::{Report, Solution};
-pub use solve::{Config, Error, Progress, solve};
+pub use solve::{Config, Error, Progress, solve, solve_for};

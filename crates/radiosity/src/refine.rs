@@ -7,6 +7,7 @@ use crate::clusters::{Clusters, Member};
 use crate::element::cluster;
 use crate::element::{EdgeMarks, Elements, Side, VertexId, slot};
 use crate::field::Field;
+use crate::importance::Importance;
 use crate::flags::{Flags, visible_weights};
 use crate::reach::Reach;
 use crate::solve::{Config, Progress};
@@ -33,6 +34,7 @@ pub(crate) const INWARD: f32 = 0.02;
 pub(crate) struct Refiner<'a> {
     pub(crate) world: &'a World,
     pub(crate) config: &'a Config,
+    importance: Option<&'a Importance>,
     pub(crate) progress: &'a dyn Progress,
     pub(crate) elements: Elements,
     pub(crate) reach: Reach,
@@ -43,6 +45,8 @@ pub(crate) struct Refiner<'a> {
     diffuse: Vec<bool>,
     /// Vertices whose surroundings the mesh does not resolve.
     pub(crate) unresolved: Vec<VertexId>,
+    /// What an error matters at each slot, (0, 1]; empty where all matters alike.
+    weights: Vec<f32>,
     /// Longest edge of the first mesh, m.
     h0: f32,
     /// Shortest edge worth splitting to, m.
@@ -50,6 +54,9 @@ pub(crate) struct Refiner<'a> {
     /// Reach of a site in finely tessellated surface, m.
     pub(crate) radius: f32,
 }
+
+#[allow(non_snake_case)]
+fn BEYOND() -> f32 { std::env::var("BEYOND").map_or(1.0, |b| b.parse().unwrap()) }
 
 /// What solving on the present mesh gave.
 pub(crate) struct Solved {
@@ -77,7 +84,12 @@ struct Test {
 
 impl<'a> Refiner<'a> {
     /// The first mesh: no edge longer than h0, sites where clusters of vertices need them, all gathered.
-    pub(crate) fn start(world: &'a World, config: &'a Config, progress: &'a dyn Progress) -> Refiner<'a> {
+    pub(crate) fn start(
+        world: &'a World,
+        config: &'a Config,
+        importance: Option<&'a Importance>,
+        progress: &'a dyn Progress,
+    ) -> Refiner<'a> {
         let scale = world.scale;
         let (h0, h_min, mut radius) =
             (config.h0 * scale, config.h_min * scale, config.cluster_radius * scale);
@@ -97,16 +109,19 @@ impl<'a> Refiner<'a> {
             diffuse,
             world,
             config,
+            importance,
             progress,
             elements,
             reach,
             field: Field::default(),
             e: Vec::new(),
             unresolved: Vec::new(),
+            weights: Vec::new(),
             h0,
             h_min,
             radius,
         };
+        refiner.weigh();
         let used = refiner.used();
         let choose = |radius: f32| {
             let candidates = (0..used.len() as VertexId).filter(|&v| used[v as usize]);
@@ -124,6 +139,18 @@ impl<'a> Refiner<'a> {
         refiner.radius = radius;
         refiner.gather(&chosen.into_iter().map(|v| (v, [true; 2])).collect::<Vec<_>>());
         refiner
+    }
+
+    /// Finds anew what matters, after the mesh was refined.
+    fn weigh(&mut self) {
+        if let Some(importance) = self.importance {
+            self.weights = importance.weights(&self.elements);
+        }
+    }
+
+    /// What an error at a slot matters, (0, 1].
+    pub(crate) fn weight(&self, slot: usize) -> f32 {
+        self.weights.get(slot).copied().unwrap_or(1.0)
     }
 
     /// Tests and refines until the tolerance, the finest edge, the sites, the rounds or the time run out.
@@ -245,7 +272,8 @@ impl<'a> Refiner<'a> {
                     return 0.0;
                 }
                 let (sa, sb) = (slot(a, side), slot(b, side));
-                match (self.field.usable(sa), self.field.usable(sb)) {
+                let matters = self.weight(sa).max(self.weight(sb));
+                matters * match (self.field.usable(sa), self.field.usable(sb)) {
                     (true, true) => {
                         let (va, vb) = (values[sa], values[sb]);
                         promise((va - vb).map(f32::abs).mean(), 0.5 * (va + vb).mean(), sa)
@@ -258,7 +286,7 @@ impl<'a> Refiner<'a> {
         let around = |v: VertexId| {
             let of = |&side: &Side| {
                 let s = slot(v, side);
-                promise(self.field.spread_around(s, &self.e), values[s].mean(), s)
+                self.weight(s) * promise(self.field.spread_around(s, &self.e), values[s].mean(), s)
             };
             Side::BOTH.iter().filter(|&&side| self.field.usable(slot(v, side))).map(of).fold(0.0, f32::max)
         };
@@ -319,7 +347,8 @@ impl<'a> Refiner<'a> {
                 let difference = (got - predicted).map(f32::abs).mean();
                 // What the rays' own noise explains is no bend of the light.
                 let noise = known_variance / (weight * weight) + self.field.variance(slot(test.vertex, side));
-                let bend = (difference * difference - noise).max(0.0).sqrt();
+                let matters = self.weight(slot(test.vertex, side));
+                let bend = matters * (difference * difference - BEYOND() * noise).max(0.0).sqrt();
                 bend / (0.5 * (got + predicted).mean() + floor).max(1e-30)
             })
             .fold(0.0, f32::max)
@@ -334,6 +363,7 @@ impl<'a> Refiner<'a> {
             marks.mark(a, b);
         }
         self.elements.split(&mut marks);
+        self.weigh();
         let midpoints = marks.split_edges();
         for &(a, b, m) in &midpoints {
             self.field.put_between(m, [a, b]);

@@ -15,7 +15,9 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 /// Sites that the fits reach over, one after the other.
-const REACHES: [usize; 4] = [7, 12, 20, 34];
+const REACHES: [usize; 3] = [14, 22, 36];
+/// Terms of a fit: up to the second order in two directions.
+const TERMS: usize = 6;
 /// A fit is believed when it is no further than so many standard deviations from every smaller one.
 const AGREE: f32 = 1.5; // tuned below
 /// Normals further apart than this (cosine) look at other things.
@@ -101,24 +103,25 @@ fn fit(refiner: &Refiner, field: &Field, graph: &Graph, variance: &[f32], site: 
         let Some(&(edge, _)) = around.get(reach) else { break };
         let near = &around[..reach];
         let r = edge.max(1e-12);
-        // Normal equations of E ≈ a + b x + c y.
-        let mut m = [[0f64; 3]; 3];
-        let mut rows: Vec<(u32, f64, [f64; 3])> = Vec::with_capacity(reach);
+        // Normal equations of E ≈ a + b x + c y + d x² + e x y + f y².
+        let mut m = [[0f64; TERMS]; TERMS];
+        let mut rows: Vec<(u32, f64, [f64; TERMS])> = Vec::with_capacity(reach);
         for &(d, s) in near {
             let way = (at(s).position - here.position) / r;
-            let x = [1.0, f64::from(way.dot(tangent)), f64::from(way.dot(bitangent))];
+            let (x, y) = (f64::from(way.dot(tangent)), f64::from(way.dot(bitangent)));
+            let terms = [1.0, x, y, x * x, x * y, y * y];
             let kernel = 1.0 - f64::from(d / r).powi(2);
             let noise = f64::from(variance[s as usize] + 0.25 * variance[site as usize]).max(1e-30);
             let w = kernel / noise;
-            for i in 0..3 {
-                for j in 0..3 {
-                    m[i][j] += w * x[i] * x[j];
+            for i in 0..TERMS {
+                for j in 0..TERMS {
+                    m[i][j] += w * terms[i] * terms[j];
                 }
             }
-            rows.push((s, w, x));
+            rows.push((s, w, terms));
         }
         let Some(first) = first_row_of_inverse(m) else { continue };
-        let weight = |w: f64, x: &[f64; 3]| w * (first[0] * x[0] + first[1] * x[1] + first[2] * x[2]);
+        let weight = |w: f64, terms: &[f64; TERMS]| w * (0..TERMS).map(|i| first[i] * terms[i]).sum::<f64>();
         let value: Rgb = rows.iter().map(|(s, w, x)| refiner.e[*s as usize] * weight(*w, x) as f32).sum();
         let noise: f64 =
             rows.iter().map(|(s, w, x)| weight(*w, x).powi(2) * f64::from(variance[*s as usize])).sum();
@@ -169,10 +172,30 @@ fn around(refiner: &Refiner, field: &Field, graph: &Graph, site: u32) -> Vec<(f3
     found
 }
 
-/// First row of the inverse of a symmetric matrix; none when it is (nearly) singular, as for sites in one line.
-fn first_row_of_inverse(m: [[f64; 3]; 3]) -> Option<[f64; 3]> {
-    let minor = |a: usize, b: usize, c: usize, d: usize| m[1][a] * m[2][b] - m[1][c] * m[2][d];
-    let cofactors = [minor(1, 2, 2, 1), -minor(0, 2, 2, 0), minor(0, 1, 1, 0)];
-    let determinant = m[0][0] * cofactors[0] + m[0][1] * cofactors[1] + m[0][2] * cofactors[2];
-    (determinant > 1e-6 * m[0][0] * m[0][0] * m[0][0]).then(|| cofactors.map(|c| c / determinant))
+/// First row of the inverse of a symmetric positive matrix, by Cholesky's factors; none when it is (nearly) singular, as
+/// for sites in one line.
+fn first_row_of_inverse(m: [[f64; TERMS]; TERMS]) -> Option<[f64; TERMS]> {
+    let mut l = [[0f64; TERMS]; TERMS];
+    for i in 0..TERMS {
+        for j in 0..=i {
+            let sum = m[i][j] - (0..j).map(|k| l[i][k] * l[j][k]).sum::<f64>();
+            if i != j {
+                l[i][j] = sum / l[j][j];
+            } else if sum > 1e-9 * m[0][0] {
+                l[i][i] = sum.sqrt();
+            } else {
+                return None;
+            }
+        }
+    }
+    let mut y = [0f64; TERMS];
+    for i in 0..TERMS {
+        let right = if i == 0 { 1.0 } else { 0.0 };
+        y[i] = (right - (0..i).map(|k| l[i][k] * y[k]).sum::<f64>()) / l[i][i];
+    }
+    let mut x = [0f64; TERMS];
+    for i in (0..TERMS).rev() {
+        x[i] = (y[i] - (i + 1..TERMS).map(|k| l[k][i] * x[k]).sum::<f64>()) / l[i][i];
+    }
+    Some(x)
 }

@@ -1,6 +1,7 @@
 //! The whole prepass: mesh, gather, refine, photons, solve.
 
 use crate::caustic::Caustics;
+use crate::importance::Importance;
 use crate::refine::{Refiner, Solved, mean};
 use crate::smooth;
 use crate::solution::{Report, Solution};
@@ -103,7 +104,17 @@ impl Progress for () {
 ///
 /// Fails only when there is no finite answer; an unfinished one is a rougher picture, and the report says so.
 pub fn solve(world: &World, config: &Config, progress: &dyn Progress) -> Result<Solution, Error> {
-    let mut refiner = Refiner::start(world, config, progress);
+    solve_for(world, config, None, progress)
+}
+
+/// The same, with less care where `importance` says that it matters less.
+pub fn solve_for(
+    world: &World,
+    config: &Config,
+    importance: Option<&Importance>,
+    progress: &dyn Progress,
+) -> Result<Solution, Error> {
+    let mut refiner = Refiner::start(world, config, importance, progress);
     refiner.refine();
     progress.stage("caustics", 1);
     let caustics = Caustics::trace(world, &refiner.elements, config.photons, config.seed);

@@ -5,6 +5,7 @@
 //! lack, until their estimated error is below the one asked for.
 
 use crate::film::{Film, Pixel};
+use crate::importance::importance;
 use crate::integrator::hybrid::Hybrid;
 use crate::integrator::path;
 use crate::pixel::{Effort, Key, Shot, View, shade};
@@ -108,6 +109,17 @@ pub fn prepass(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Solution, radiosity::Error> {
+    prepass_for(world, &[], settings, progress)
+}
+
+/// The prepass for views by `cameras`: it takes care of what they see and of what lights that, and less of the rest. One
+/// serves them all; for other views it is rougher. Without cameras everything matters alike.
+pub fn prepass_for(
+    world: &World,
+    cameras: &[Camera],
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Solution, radiosity::Error> {
     let mut config = Config { seed: settings.seed, ..Config::for_error(settings.error) };
     if let Some(rays) = settings.gather_rays {
         config.rays = rays;
@@ -115,7 +127,9 @@ pub fn prepass(
     // At most half of the time goes to the prepass; a rougher solution still makes a whole picture.
     let now = Instant::now();
     let deadline = settings.deadline.map(|end| now + end.saturating_duration_since(now) / 2);
-    radiosity::solve(world, &config, &Watch { progress, deadline })
+    let aspect = settings.width as f32 / settings.height.max(1) as f32;
+    let matters = (!cameras.is_empty()).then(|| importance(world, cameras, aspect));
+    radiosity::solve_for(world, &config, matters.as_ref(), &Watch { progress, deadline })
 }
 
 /// Renders `world` as `camera` sees it. The hybrid integrator needs the `solution` of [`prepass`]; without one it is made here.
@@ -137,7 +151,7 @@ pub fn render(
             let solution = match solution {
                 Some(solution) => solution,
                 None => {
-                    made = prepass(world, settings, progress)?;
+                    made = prepass_for(world, std::slice::from_ref(camera), settings, progress)?;
                     report.stages.push(("prepass", start.elapsed().as_secs_f64()));
                     &made
                 }

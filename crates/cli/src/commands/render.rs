@@ -8,7 +8,7 @@ use crate::{cameras, load};
 use anyhow::{Context, Result};
 use geometry::{Camera, Scene, World};
 use raytrace::exr::Metadata;
-use raytrace::{Integrator, Outcome, Progress, Settings, exr, prepass, render, tonemap};
+use raytrace::{Integrator, Outcome, Progress, Settings, exr, prepass_for, render, tonemap};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -59,7 +59,7 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
         if settings.integrator == Integrator::Hybrid && solution.is_none() {
             // Light does not know where we stand: one solution serves all views.
             solution = Some(
-                prepass(&world, &settings, &bars)
+                prepass_for(&world, &choice.cameras, &settings, &bars)
                     .with_context(|| format!("cannot solve {}", job.scene.display()))?,
             );
             shared.push(("prepass", lap(&mut clock)));

@@ -1,13 +1,13 @@
 //! How exact E is where a camera sees it, and what the error is made of: noise that another seed would change, or bias
 //! that it would not; where the mesh is trusted, or where pass 2 gathers for itself.
 //!
-//! Random walks from the points that camera rays meet, two independent halves of them, are the truth. They are kept
-//! beside the scene's name in the folder named, for they cost more than all solves.
+//! The truth is two long gathers at each point that a camera ray meets, which read a finer solution where they end. It is
+//! kept in a file, for it costs more than what is judged by it.
 //!
-//!     cargo run --release -p radiosity --example irradiance_error -- assets/gallery.glb --error 0.05
+//!     cargo run --release -p raytrace --example irradiance_error -- assets/gallery.glb --error 0.05
 
 use geometry::math::{offset_origin, to_world};
-use geometry::sampling::{Rng, cosine_hemisphere};
+use geometry::sampling::{Lattice2, Rng, cosine_hemisphere};
 use geometry::{Camera, Hit, Ray, Rgb, Surface, Vec3, World, photometry};
 use radiosity::element::Side;
 use radiosity::gather::{self, Origin};
@@ -22,12 +22,15 @@ struct Place {
     hit: Hit,
 }
 
-/// Indirect irradiance by either half of the walks, and the direct one, lx.
+type Failure = Box<dyn std::error::Error>;
+
+/// Indirect irradiance by either gather, and the direct one, lx.
 type Truth = [Rgb; 3];
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+fn main() -> Result<(), Failure> {
     let mut scenes = Vec::new();
-    let (mut error, mut seeds, mut walks, mut across) = (0.02f32, 1u64, 2048u32, 32u32);
+    let mut aware = true;
+    let (mut error, mut seeds, mut truth_rays, mut across, mut finer) = (0.02f32, 1u64, 2048u32, 24u32, 0.01f32);
     let (mut folder, mut points) = (PathBuf::from("target/irradiance"), None);
     let mut set: Vec<(String, String)> = Vec::new();
     let mut args = std::env::args().skip(1);
@@ -36,8 +39,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         match arg.as_str() {
             "--error" => error = value()?.parse()?,
             "--seeds" => seeds = value()?.parse()?,
-            "--walks" => walks = value()?.parse()?,
+            "--truth" => finer = value()?.parse()?,
+            "--truth-rays" => truth_rays = value()?.parse()?,
             "--across" => across = value()?.parse()?,
+            "--blind" => aware = false,
             "--folder" => folder = value()?.into(),
             "--points" => points = Some(PathBuf::from(value()?)),
             "--rays" | "--sites" | "--tolerance" | "--hmin" | "--rounds" | "--photons" | "--radius" => {
@@ -55,7 +60,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let camera = loaded.cameras.first().cloned().unwrap_or_else(|| Camera::framing(lo, hi));
         let places = places(&world, &camera, across);
         let name = scene.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let truth = truths(&world, &places, walks, &folder.join(format!("{name}-{across}-{walks}.txt")))?;
+        let truth = truths(&world, &places, truth_rays, finer, &folder.join(format!("{name}-{across}-{finer}.txt")))?;
         let mut found: Vec<Vec<Rgb>> = Vec::new();
         let mut last = None;
         for seed in 0..seeds {
@@ -71,8 +76,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     _ => config.photons = v.parse()?,
                 }
             }
+            let matters = aware.then(|| raytrace::importance::importance(&world, std::slice::from_ref(&camera), camera.aspect.unwrap_or(1.5)));
             let (start, before) = (Instant::now(), world.bvh.rays_cast());
-            let solution = radiosity::solve(&world, &config, &())?;
+            let solution = radiosity::solve_for(&world, &config, matters.as_ref(), &())?;
             let (seconds, rays) = (start.elapsed().as_secs_f64(), world.bvh.rays_cast() - before);
             let e: Vec<Rgb> = places.iter().map(|p| at(&world, &solution, p)).collect();
             let r = &solution.report;
@@ -126,40 +132,9 @@ fn at(world: &World, solution: &Solution, p: &Place) -> Rgb {
     solution.irradiance(world, p.hit.triangle, p.hit.u, p.hit.v, side(world, p))
 }
 
-/// One random walk from a point: light that arrives indirectly, lx.
-fn walk(world: &World, mut p: Vec3, mut ns: Vec3, mut ng: Vec3, rng: &mut Rng) -> Rgb {
-    let (mut sum, mut throughput) = (Rgb::BLACK, Rgb::WHITE);
-    loop {
-        let wi = to_world(cosine_hemisphere(rng.vec2()), ns);
-        if wi.dot(ng) <= 0.0 {
-            return sum;
-        }
-        let ray = Ray::new(offset_origin(p, ng), wi);
-        let mut landed = None;
-        let followed =
-            gather::follow(world, ray, rng, |hit, side, weight| landed = Some((*hit, side, weight)));
-        sum += throughput * followed.direct;
-        let Some((hit, side, weight)) = landed else { return sum };
-        throughput *= weight;
-        let live = throughput.max_channel().min(1.0);
-        if live < 0.3 {
-            if rng.f32() >= live / 0.3 {
-                return sum;
-            }
-            throughput *= 0.3 / live;
-        }
-        let mesh = &world.scene.mesh;
-        p = mesh.interpolate(hit.triangle, hit.u, hit.v, &mesh.positions);
-        ng = mesh.geometric_normal(hit.triangle) * side.sign();
-        ns = mesh.interpolate(hit.triangle, hit.u, hit.v, &mesh.normals).normalize_or(ng);
-        if ns.dot(ng) < 0.0 {
-            ns = -ns;
-        }
-    }
-}
-
-/// What is true at every place, from the file where it was kept or by `walks` random walks for either half.
-fn truths(world: &World, places: &[Place], walks: u32, kept: &Path) -> std::io::Result<Vec<Truth>> {
+/// What is true at every place, from the file where it was kept or by two gathers of `rays` rays that read a solution
+/// made for `error`.
+fn truths(world: &World, places: &[Place], rays: u32, error: f32, kept: &Path) -> Result<Vec<Truth>, Failure> {
     if let Ok(text) = std::fs::read_to_string(kept) {
         let numbers: Vec<f32> = text.split_whitespace().filter_map(|n| n.parse().ok()).collect();
         if numbers.len() == 9 * places.len() {
@@ -167,6 +142,8 @@ fn truths(world: &World, places: &[Place], walks: u32, kept: &Path) -> std::io::
             return Ok(numbers.chunks(9).map(|n| [rgb(n), rgb(&n[3..]), rgb(&n[6..])]).collect());
         }
     }
+    let solution = radiosity::solve(world, &Config { seed: 0x7472_7574_68, ..Config::for_error(error) }, &())?;
+    let pattern = Lattice2::new(rays);
     let truth: Vec<Truth> = places
         .par_iter()
         .enumerate()
@@ -174,11 +151,26 @@ fn truths(world: &World, places: &[Place], walks: u32, kept: &Path) -> std::io::
             let s = Surface::new(&world.scene, &place.ray, &place.hit);
             let half = |k: u64| {
                 let mut rng = Rng::new(0x7472_7574_6800 + k, i as u64);
-                let sum: Rgb = (0..walks).map(|_| walk(world, s.position, s.ns, s.ng, &mut rng)).sum();
-                sum / walks as f32
+                let shift = rng.vec2();
+                let brought = |wi: Vec3, rng: &mut Rng| {
+                    let mut reflected = Rgb::BLACK;
+                    let ray = Ray::new(offset_origin(s.position, s.ng), wi);
+                    let followed = gather::follow(world, ray, rng, |hit, side, weight| {
+                        let (t, u, v) = (hit.triangle, hit.u, hit.v);
+                        let e = solution.irradiance(world, t, u, v, side) + solution.caustic(world, t, u, v, side);
+                        reflected = weight * e;
+                    });
+                    followed.direct + reflected
+                };
+                let sum: Rgb = (0..rays)
+                    .map(|j| to_world(cosine_hemisphere(pattern.point(j, shift)), s.ns))
+                    .filter(|wi| wi.dot(s.ng) > 0.0)
+                    .map(|wi| brought(wi, &mut rng))
+                    .sum();
+                sum / rays as f32
             };
             let origin = [Origin { position: s.position, ng: s.ng }];
-            [half(0), half(1), gather::direct(world, &origin, s.ns, 1024, 1, i as u64)]
+            [half(0), half(1), gather::direct(world, &origin, s.ns, 256, 1, i as u64)]
         })
         .collect();
     let line = |t: &Truth| t.map(|c| format!("{} {} {}", c.r, c.g, c.b)).join(" ");
