@@ -7,8 +7,8 @@ use crate::clusters::{Clusters, Member};
 use crate::element::cluster;
 use crate::element::{EdgeMarks, Elements, Side, VertexId, slot};
 use crate::field::Field;
-use crate::importance::Importance;
 use crate::flags::{Flags, visible_weights};
+use crate::importance::Importance;
 use crate::reach::Reach;
 use crate::solve::{Config, Progress};
 use crate::solver::{self, Convergence, Gain};
@@ -22,6 +22,9 @@ use std::collections::HashMap;
 /// A midpoint this far (relative) from its prediction, at the finest mesh, marks its surroundings for a gather of
 /// their own in pass 2.
 const ROUGH: f32 = 0.15;
+/// Times the variance of the noise that such a difference is to exceed: two standard deviations. With one, the gallery's
+/// pixels gathered for themselves wherever 80 rays a site happened to differ.
+const STANDS_OUT: f32 = 4.0;
 /// Elements (of h0² each) that the first mesh may have, about.
 const FIRST_ELEMENTS: f32 = 10_000.0;
 /// Rays that probe the middle of a leaf.
@@ -54,9 +57,6 @@ pub(crate) struct Refiner<'a> {
     /// Reach of a site in finely tessellated surface, m.
     pub(crate) radius: f32,
 }
-
-#[allow(non_snake_case)]
-fn BEYOND() -> f32 { std::env::var("BEYOND").map_or(1.0, |b| b.parse().unwrap()) }
 
 /// What solving on the present mesh gave.
 pub(crate) struct Solved {
@@ -191,15 +191,15 @@ impl<'a> Refiner<'a> {
             self.settle();
             let values = self.field.spread(&self.e);
             let floor = 0.1 * mean(&self.e).mean();
-            let errors: Vec<f32> = tests.iter().map(|t| self.error(t, &values, floor)).collect();
+            let errors: Vec<[f32; 2]> = tests.iter().map(|t| self.error(t, &values, floor)).collect();
             rough.resize(self.elements.vertices.len(), false);
             let mut failed = vec![false; self.elements.vertices.len()];
-            for (test, &error) in tests.iter().zip(&errors) {
+            for (test, &[error, rough_error]) in tests.iter().zip(&errors) {
                 let weighed = error * (test.length / self.h0).min(1.0);
                 // What stands on an edge is worth a quarter of the tolerance: the light may be even all the same.
                 failed[test.vertex as usize] =
                     weighed > self.config.tolerance * if test.parted { 0.25 } else { 1.0 };
-                rough[test.vertex as usize] = error > ROUGH;
+                rough[test.vertex as usize] = rough_error > ROUGH;
             }
             edges = self.edges_longer_than(2.0 * self.h_min, |v| failed[v as usize]);
             edges.extend(kept);
@@ -253,18 +253,18 @@ impl<'a> Refiner<'a> {
         let values = self.field.spread(&self.e);
         let floor = 0.1 * mean(&self.e).mean();
         let elsewhere = self.means_of_faces();
-        let promise =
-            |difference: f32, level: f32, slot: usize| match level + elsewhere[self.face_slot(slot)] {
-                // Without indirect light there may be the direct one, for those who take it from the vertices.
-                0.0 => {
-                    if self.reach.shone_on(self.elements.vertices[slot / 2].face, Side::BOTH[slot % 2]) {
-                        HIDDEN
-                    } else {
-                        0.0
-                    }
+        let promise = |difference: f32, level: f32, slot: usize| match level + elsewhere[self.face_slot(slot)]
+        {
+            // Without indirect light there may be the direct one, for those who take it from the vertices.
+            0.0 => {
+                if self.reach.shone_on(self.elements.vertices[slot / 2].face, Side::BOTH[slot % 2]) {
+                    HIDDEN
+                } else {
+                    0.0
                 }
-                around => (difference + HIDDEN * around) / (level + floor),
-            };
+            }
+            around => (difference + HIDDEN * around) / (level + floor),
+        };
         let change = |a: VertexId, b: VertexId| {
             let face = self.elements.vertices[a as usize].face;
             Side::BOTH.map(|side| {
@@ -273,14 +273,15 @@ impl<'a> Refiner<'a> {
                 }
                 let (sa, sb) = (slot(a, side), slot(b, side));
                 let matters = self.weight(sa).max(self.weight(sb));
-                matters * match (self.field.usable(sa), self.field.usable(sb)) {
-                    (true, true) => {
-                        let (va, vb) = (values[sa], values[sb]);
-                        promise((va - vb).map(f32::abs).mean(), 0.5 * (va + vb).mean(), sa)
+                matters
+                    * match (self.field.usable(sa), self.field.usable(sb)) {
+                        (true, true) => {
+                            let (va, vb) = (values[sa], values[sb]);
+                            promise((va - vb).map(f32::abs).mean(), 0.5 * (va + vb).mean(), sa)
+                        }
+                        // A buried end says nothing of the rest.
+                        _ => 1.0,
                     }
-                    // A buried end says nothing of the rest.
-                    _ => 1.0,
-                }
             })
         };
         let around = |v: VertexId| {
@@ -327,8 +328,9 @@ impl<'a> Refiner<'a> {
         2 * self.elements.vertices[slot / 2].face as usize + slot % 2
     }
 
-    /// Relative difference of what was gathered from what was predicted, the worse side.
-    fn error(&self, test: &Test, values: &[Rgb], floor: f32) -> f32 {
+    /// Relative difference of what was gathered from what was predicted, the worse side: by what it matters, and as such
+    /// where it stands out of the rays' noise (the two of [`ROUGH`]).
+    fn error(&self, test: &Test, values: &[Rgb], floor: f32) -> [f32; 2] {
         Side::BOTH
             .iter()
             .filter(|side| test.sides[side.index()] && self.field.usable(slot(test.vertex, **side)))
@@ -341,17 +343,17 @@ impl<'a> Refiner<'a> {
                         (s + values[slot] * k, w + k, n + k * k * self.field.variance(slot))
                     });
                 if weight <= 0.0 {
-                    return 1.0; // nothing around it speaks for it
+                    return [1.0; 2]; // nothing around it speaks for it
                 }
                 let predicted = sum / weight;
                 let difference = (got - predicted).map(f32::abs).mean();
                 // What the rays' own noise explains is no bend of the light.
                 let noise = known_variance / (weight * weight) + self.field.variance(slot(test.vertex, side));
-                let matters = self.weight(slot(test.vertex, side));
-                let bend = matters * (difference * difference - BEYOND() * noise).max(0.0).sqrt();
-                bend / (0.5 * (got + predicted).mean() + floor).max(1e-30)
+                let level = (0.5 * (got + predicted).mean() + floor).max(1e-30);
+                let beyond = |noise: f32| (difference * difference - noise).max(0.0).sqrt() / level;
+                [self.weight(slot(test.vertex, side)) * beyond(noise), beyond(STANDS_OUT * noise)]
             })
-            .fold(0.0, f32::max)
+            .fold([0.0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])])
     }
 
     /// Splits the edges; each midpoint is a test on the sides named.
@@ -435,13 +437,7 @@ impl<'a> Refiner<'a> {
     }
 
     /// Solves E = D + K (E + extra) to `tolerance` lx from the present E, in at most `most` steps; also ‖K‖∞.
-    pub(crate) fn solved(
-        &self,
-        tolerance: f32,
-        most: u32,
-        extra: &[Rgb],
-        flags: &Flags,
-    ) -> Solved {
+    pub(crate) fn solved(&self, tolerance: f32, most: u32, extra: &[Rgb], flags: &Flags) -> Solved {
         let usable = |s: usize| self.field.usable(s);
         let transport = Transport::locate(&self.elements, &self.field, |node, side, w| {
             visible_weights(self.world, &self.elements, flags, usable, node, side, w)

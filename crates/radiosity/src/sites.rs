@@ -47,7 +47,12 @@ impl Refiner<'_> {
             }
         }
         self.e.extend(rows.iter().map(|row| row.direct));
-        let sites = jobs.into_iter().zip(rows).map(|((vertex, side), row)| Site { vertex, side, variance: row.variance, row });
+        let sites = jobs.into_iter().zip(rows).map(|((vertex, side), row)| Site {
+            vertex,
+            side,
+            variance: row.variance,
+            row,
+        });
         self.field.sites.extend(sites);
         self.field.connect(self.world, &self.elements, self.radius);
     }
@@ -69,8 +74,7 @@ impl Refiner<'_> {
         let held: usize = self.field.sites.iter().map(|s| s.row.landings.len()).sum();
         let room = self.config.most_landings.saturating_sub(held) / jobs.len().max(1);
         let room = u32::try_from(room).unwrap_or(u32::MAX);
-        let rays: Vec<u32> =
-            jobs.iter().map(|&(v, side)| rays(slot(v, side)).min(room).max(16)).collect();
+        let rays: Vec<u32> = jobs.iter().map(|&(v, side)| rays(slot(v, side)).min(room).max(16)).collect();
         let mut patterns: HashMap<u32, Lattice2> = HashMap::new();
         for &n in &rays {
             patterns.entry(n).or_insert_with(|| Lattice2::new(n));
@@ -85,7 +89,15 @@ impl Refiner<'_> {
                 let normal = self.elements.vertices[vertex as usize].normal * side.sign();
                 // Another number of rays draws other numbers: a row that is done again shares nothing with the first.
                 let stream = (u64::from(rays) << 40) ^ slot(vertex, side) as u64;
-                let row = gather::row(self.world, &turned, normal, &patterns[&rays], self.config.seed, stream, dead);
+                let row = gather::row(
+                    self.world,
+                    &turned,
+                    normal,
+                    &patterns[&rays],
+                    self.config.seed,
+                    stream,
+                    dead,
+                );
                 self.progress.advance(1);
                 row
             })
@@ -127,35 +139,32 @@ impl Refiner<'_> {
         let smooth = (normals[0] + normals[1] + normals[2]).normalize_or(ng);
         let dead =
             |t: u32, side: Side| self.elements.face(t).is_none_or(|face| !self.reach.alive(face, side));
-        Side::BOTH.iter().filter(|&&side| self.reach.alive(self.elements.face_of(leaf), side)).any(
-            |&side| {
-                let origins = [Origin { position: middle, ng: ng * side.sign() }];
-                let stream = (1 << 62) | slot(leaf, side) as u64;
-                let normal = smooth * side.sign();
-                let row = gather::row(self.world, &origins, normal, pattern, self.config.seed, stream, dead);
-                if row.dead > 0.5 {
-                    return false; // the middle is buried
-                }
-                let mut got = row.direct;
-                for landing in row.landings.iter() {
-                    let (triangle, side) = landing.place();
-                    let (u, v) = landing.uv();
-                    let (node, w) = self.elements.locate(triangle, u, v);
-                    let corners = self.elements.nodes[node as usize].vertices;
-                    got +=
-                        landing.weight() * (0..3).map(|i| values[slot(corners[i], side)] * w[i]).sum::<Rgb>();
-                }
-                let known = vertices.map(|v| slot(v, side)).into_iter().filter(|&s| self.field.usable(s));
-                let (sum, count) = known.fold((Rgb::BLACK, 0.0), |(s, n), slot| (s + values[slot], n + 1.0));
-                if count == 0.0 {
-                    return true; // no corner knows anything of it
-                }
-                let predicted = sum.mean() / count;
-                let off = (got.mean() - predicted).abs();
-                // Twice as bright or half as dark, and beyond two standard errors of so few rays.
-                off > 0.5 * (predicted + floor) && off * off > 4.0 * row.variance
-            },
-        )
+        Side::BOTH.iter().filter(|&&side| self.reach.alive(self.elements.face_of(leaf), side)).any(|&side| {
+            let origins = [Origin { position: middle, ng: ng * side.sign() }];
+            let stream = (1 << 62) | slot(leaf, side) as u64;
+            let normal = smooth * side.sign();
+            let row = gather::row(self.world, &origins, normal, pattern, self.config.seed, stream, dead);
+            if row.dead > 0.5 {
+                return false; // the middle is buried
+            }
+            let mut got = row.direct;
+            for landing in row.landings.iter() {
+                let (triangle, side) = landing.place();
+                let (u, v) = landing.uv();
+                let (node, w) = self.elements.locate(triangle, u, v);
+                let corners = self.elements.nodes[node as usize].vertices;
+                got += landing.weight() * (0..3).map(|i| values[slot(corners[i], side)] * w[i]).sum::<Rgb>();
+            }
+            let known = vertices.map(|v| slot(v, side)).into_iter().filter(|&s| self.field.usable(s));
+            let (sum, count) = known.fold((Rgb::BLACK, 0.0), |(s, n), slot| (s + values[slot], n + 1.0));
+            if count == 0.0 {
+                return true; // no corner knows anything of it
+            }
+            let predicted = sum.mean() / count;
+            let off = (got.mean() - predicted).abs();
+            // Twice as bright or half as dark, and beyond two standard errors of so few rays.
+            off > 0.5 * (predicted + floor) && off * off > 4.0 * row.variance
+        })
     }
 
     /// Direct irradiance at every slot, lx: `samples` light samples at each site.

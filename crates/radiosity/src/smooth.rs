@@ -1,8 +1,9 @@
 //! Less noise in E: where the light changes evenly, neighbouring sites lend one another their rays.
 //!
-//! Each site's value becomes the local linear fit to the sites around it (Fan and Gijbels, "Local Polynomial Modelling
+//! Each site's value becomes the local quadratic fit to the sites around it (Fan and Gijbels, "Local Polynomial Modelling
 //! and Its Applications", 1996, section 3.2), as far around as the fits agree within their noise: Lepski's rule (Theory
-//! Probab. Appl. 35, 1991). What the rays cannot tell from even light is treated as even; what they can stays.
+//! Probab. Appl. 35, 1991). What the rays cannot tell from even light is treated as even; what they can stays. A fit of
+//! the first order smoothed corners away: as much bias won as noise lost, in a Cornell box.
 
 use crate::element::{Side, slot};
 use crate::field::Field;
@@ -18,8 +19,9 @@ use std::collections::BinaryHeap;
 const REACHES: [usize; 3] = [14, 22, 36];
 /// Terms of a fit: up to the second order in two directions.
 const TERMS: usize = 6;
-/// A fit is believed when it is no further than so many standard deviations from every smaller one.
-const AGREE: f32 = 1.5; // tuned below
+/// A fit is believed when it is no further than so many standard deviations from every smaller one. At 3 the noise of E
+/// falls by a further fifth in the gallery at 5 %, and the bias in a Cornell box at 2 % rises from 0.7 % to 1.1 %.
+const AGREE: f32 = 2.0;
 /// Normals further apart than this (cosine) look at other things.
 const ALIKE: f32 = 0.95;
 
@@ -94,8 +96,6 @@ fn fit(refiner: &Refiner, field: &Field, graph: &Graph, variance: &[f32], site: 
     let at = |s: u32| &refiner.elements.vertices[field.sites[s as usize].vertex as usize];
     let here = at(site);
     let (tangent, bitangent) = frame(here.normal);
-    // The least noise that is taken for real: where rays found none there is nothing to mend.
-    let agree = std::env::var("AGREE").map_or(AGREE, |a| a.parse().unwrap());
     let mut believed = own;
     // Every fit so far: its value (mean of the channels) and variance.
     let mut fits: Vec<(f32, f32)> = vec![(own.mean(), variance[site as usize])];
@@ -127,17 +127,13 @@ fn fit(refiner: &Refiner, field: &Field, graph: &Graph, variance: &[f32], site: 
             rows.iter().map(|(s, w, x)| weight(*w, x).powi(2) * f64::from(variance[*s as usize])).sum();
         let noise = noise as f32;
         let agrees = |&(mean, v): &(f32, f32)| {
-            (value.mean() - mean).powi(2) <= agree * agree * (v - noise).max(0.1 * v)
+            (value.mean() - mean).powi(2) <= AGREE * AGREE * (v - noise).max(0.1 * v)
         };
         if !fits.iter().all(agrees) || !value.is_finite() {
             break;
         }
         fits.push((value.mean(), noise));
         believed = value;
-    }
-    if std::env::var("DBG").is_ok() {
-        let p = here.position;
-        eprintln!("DBG {} {} {} {} {} {} {} {} {:?}", p.x, p.y, p.z, here.normal.y * field.sites[site as usize].side.sign(), own.mean(), variance[site as usize].sqrt(), field.sites[site as usize].row.variance.sqrt(), field.sites[site as usize].row.rays, fits.iter().map(|f|f.0).collect::<Vec<_>>());
     }
     believed.max(Rgb::BLACK)
 }
@@ -198,4 +194,30 @@ fn first_row_of_inverse(m: [[f64; TERMS]; TERMS]) -> Option<[f64; TERMS]> {
         x[i] = (y[i] - (i + 1..TERMS).map(|k| l[k][i] * x[k]).sum::<f64>()) / l[i][i];
     }
     Some(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_row_of_an_inverse_times_the_matrix_is_the_first_unit_row() {
+        let mut m = [[0f64; TERMS]; TERMS];
+        for k in 0..20 {
+            let (x, y) = ((f64::from(k) * 0.7).sin(), (f64::from(k) * 1.3).cos());
+            let terms = [1.0, x, y, x * x, x * y, y * y];
+            for i in 0..TERMS {
+                for j in 0..TERMS {
+                    m[i][j] += terms[i] * terms[j];
+                }
+            }
+        }
+        let first = first_row_of_inverse(m).expect("twenty scattered points fix a quadric");
+        for j in 0..TERMS {
+            let product: f64 = (0..TERMS).map(|i| first[i] * m[i][j]).sum();
+            assert!((product - if j == 0 { 1.0 } else { 0.0 }).abs() < 1e-9, "{j}: {product}");
+        }
+        // All in one line: nothing tells the terms across it.
+        assert!(first_row_of_inverse([[1.0; TERMS]; TERMS]).is_none());
+    }
 }

@@ -127,9 +127,7 @@ pub fn solve_for(
         return Err(Error::Diverged { iterations: convergence.iterations, norm });
     }
     refiner.e = e;
-    if std::env::var("NOSMOOTH").is_err() {
-        refiner.e = smooth::smoothed(&refiner, &flags, &variance);
-    }
+    refiner.e = smooth::smoothed(&refiner, &flags, &variance);
     let direct = refiner.direct(config.light_samples);
     let report = Report::new(world, &refiner, &flags, &extra, &direct, convergence, norm, &caustics);
     Ok(Solution::new(refiner, flags, extra, direct, caustics, report))

@@ -166,7 +166,8 @@ impl<'a> Transport<'a> {
             .map(|(row, site)| {
                 let (mut sum, mut square) = (0.0, 0.0);
                 for landing in row {
-                    let brought = (Rgb::from(landing.weight.map(f32::from)) * self.value(&values, landing)).mean();
+                    let brought =
+                        (Rgb::from(landing.weight.map(f32::from)) * self.value(&values, landing)).mean();
                     sum += brought;
                     square += brought * brought;
                 }

@@ -30,7 +30,8 @@ type Truth = [Rgb; 3];
 fn main() -> Result<(), Failure> {
     let mut scenes = Vec::new();
     let mut aware = true;
-    let (mut error, mut seeds, mut truth_rays, mut across, mut finer) = (0.02f32, 1u64, 2048u32, 24u32, 0.01f32);
+    let (mut error, mut seeds, mut truth_rays, mut across, mut finer) =
+        (0.02f32, 1u64, 2048u32, 24u32, 0.01f32);
     let (mut folder, mut points) = (PathBuf::from("target/irradiance"), None);
     let mut set: Vec<(String, String)> = Vec::new();
     let mut args = std::env::args().skip(1);
@@ -60,7 +61,8 @@ fn main() -> Result<(), Failure> {
         let camera = loaded.cameras.first().cloned().unwrap_or_else(|| Camera::framing(lo, hi));
         let places = places(&world, &camera, across);
         let name = scene.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let truth = truths(&world, &places, truth_rays, finer, &folder.join(format!("{name}-{across}-{finer}.txt")))?;
+        let truth =
+            truths(&world, &places, truth_rays, finer, &folder.join(format!("{name}-{across}-{finer}.txt")))?;
         let mut found: Vec<Vec<Rgb>> = Vec::new();
         let mut last = None;
         for seed in 0..seeds {
@@ -76,7 +78,13 @@ fn main() -> Result<(), Failure> {
                     _ => config.photons = v.parse()?,
                 }
             }
-            let matters = aware.then(|| raytrace::importance::importance(&world, std::slice::from_ref(&camera), camera.aspect.unwrap_or(1.5)));
+            let matters = aware.then(|| {
+                raytrace::importance::importance(
+                    &world,
+                    std::slice::from_ref(&camera),
+                    camera.aspect.unwrap_or(1.5),
+                )
+            });
             let (start, before) = (Instant::now(), world.bvh.rays_cast());
             let solution = radiosity::solve_for(&world, &config, matters.as_ref(), &())?;
             let (seconds, rays) = (start.elapsed().as_secs_f64(), world.bvh.rays_cast() - before);
@@ -134,7 +142,13 @@ fn at(world: &World, solution: &Solution, p: &Place) -> Rgb {
 
 /// What is true at every place, from the file where it was kept or by two gathers of `rays` rays that read a solution
 /// made for `error`.
-fn truths(world: &World, places: &[Place], rays: u32, error: f32, kept: &Path) -> Result<Vec<Truth>, Failure> {
+fn truths(
+    world: &World,
+    places: &[Place],
+    rays: u32,
+    error: f32,
+    kept: &Path,
+) -> Result<Vec<Truth>, Failure> {
     if let Ok(text) = std::fs::read_to_string(kept) {
         let numbers: Vec<f32> = text.split_whitespace().filter_map(|n| n.parse().ok()).collect();
         if numbers.len() == 9 * places.len() {
@@ -142,7 +156,8 @@ fn truths(world: &World, places: &[Place], rays: u32, error: f32, kept: &Path) -
             return Ok(numbers.chunks(9).map(|n| [rgb(n), rgb(&n[3..]), rgb(&n[6..])]).collect());
         }
     }
-    let solution = radiosity::solve(world, &Config { seed: 0x7472_7574_68, ..Config::for_error(error) }, &())?;
+    let solution =
+        radiosity::solve(world, &Config { seed: 0x7472_7574_68, ..Config::for_error(error) }, &())?;
     let pattern = Lattice2::new(rays);
     let truth: Vec<Truth> = places
         .par_iter()
@@ -157,7 +172,8 @@ fn truths(world: &World, places: &[Place], rays: u32, error: f32, kept: &Path) -
                     let ray = Ray::new(offset_origin(s.position, s.ng), wi);
                     let followed = gather::follow(world, ray, rng, |hit, side, weight| {
                         let (t, u, v) = (hit.triangle, hit.u, hit.v);
-                        let e = solution.irradiance(world, t, u, v, side) + solution.caustic(world, t, u, v, side);
+                        let e = solution.irradiance(world, t, u, v, side)
+                            + solution.caustic(world, t, u, v, side);
                         reflected = weight * e;
                     });
                     followed.direct + reflected
@@ -222,7 +238,8 @@ fn judge(world: &World, places: &[Place], truth: &[Truth], found: &[Vec<Rgb>], o
     }
     let mut sorted: Vec<f64> = each.concat();
     sorted.sort_by(f64::total_cmp);
-    let at = |q: f64| 100.0 * sorted[((sorted.len() as f64 * q) as usize).min(sorted.len() - 1)].max(0.0).sqrt();
+    let at =
+        |q: f64| 100.0 * sorted[((sorted.len() as f64 * q) as usize).min(sorted.len() - 1)].max(0.0).sqrt();
     println!(
         "  90th percentile {:.1} %, 99th {:.1} %; {:.1} % of the points flagged",
         at(0.9),

@@ -42,4 +42,6 @@ pub mod tonemap;
 
 pub use error::Error;
 pub use film::{Film, Pixel};
-pub use render::{DiffuseMode, Integrator, Outcome, Progress, Report, Settings, prepass, prepass_for, render};
+pub use render::{
+    DiffuseMode, Integrator, Outcome, Progress, Report, Settings, prepass, prepass_for, render,
+};

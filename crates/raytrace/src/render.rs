@@ -124,6 +124,10 @@ pub fn prepass_for(
     if let Some(rays) = settings.gather_rays {
         config.rays = rays;
     }
+    if settings.diffuse != DiffuseMode::Vertex {
+        // Direct light at the vertices is for the energy balance only then: an eighth of a furnished room's rays otherwise.
+        config.light_samples = 8;
+    }
     // At most half of the time goes to the prepass; a rougher solution still makes a whole picture.
     let now = Instant::now();
     let deadline = settings.deadline.map(|end| now + end.saturating_duration_since(now) / 2);
