@@ -34,6 +34,7 @@ pub mod error;
 pub mod exr;
 pub mod film;
 pub mod flip;
+pub mod importance;
 pub mod integrator;
 pub mod metrics;
 pub mod output;
@@ -44,4 +45,6 @@ pub mod verify;
 
 pub use error::Error;
 pub use film::{Film, Pixel};
-pub use render::{DiffuseMode, Integrator, Outcome, Progress, Report, Settings, prepass, render};
+pub use render::{
+    DiffuseMode, Integrator, Outcome, Progress, Report, Settings, prepass, prepass_for, render,
+};

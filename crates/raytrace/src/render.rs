@@ -7,6 +7,7 @@
 
 use crate::effort::{self, Budget, Noise};
 use crate::film::{Film, Pixel};
+use crate::importance::importance;
 use crate::integrator::hybrid::Hybrid;
 use crate::integrator::path;
 use crate::pixel::{Effort, Shot, View, shade};
@@ -105,8 +106,6 @@ pub struct Outcome {
     pub finished: bool,
     /// How it went.
     pub report: Report,
-    /// A finer solution than the one given, where that was found too coarse: for further views.
-    pub solution: Option<Solution>,
 }
 
 /// Stops at the deadline as well as when the user says so.
@@ -141,14 +140,31 @@ pub fn prepass(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Solution, radiosity::Error> {
+    prepass_for(world, &[], settings, progress)
+}
+
+/// The prepass for views by `cameras`: it takes care of what they see and of what lights that, and less of the rest. One
+/// serves them all; for other views it is rougher. Without cameras everything matters alike.
+pub fn prepass_for(
+    world: &World,
+    cameras: &[Camera],
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Solution, radiosity::Error> {
     let mut config = Config { seed: settings.seed, ..Config::for_error(settings.error) };
     if let Some(rays) = settings.gather_rays {
         config.rays = rays;
     }
+    if settings.diffuse != DiffuseMode::Vertex {
+        // Direct light at the vertices is for the energy balance only then: an eighth of a furnished room's rays otherwise.
+        config.light_samples = 8;
+    }
     // At most half of the time goes to the prepass; a rougher solution still makes a whole picture.
     let now = Instant::now();
     let deadline = settings.deadline.map(|end| now + end.saturating_duration_since(now) / 2);
-    radiosity::solve(world, &config, &Watch { progress, deadline })
+    let aspect = settings.width as f32 / settings.height.max(1) as f32;
+    let matters = (!cameras.is_empty()).then(|| importance(world, cameras, aspect));
+    radiosity::solve_for(world, &config, matters.as_ref(), &Watch { progress, deadline })
 }
 
 /// Renders `world` as `camera` sees it. The hybrid integrator needs the `solution` of [`prepass`]; without one it is made here.
@@ -167,7 +183,7 @@ pub fn render(
             let (film, finished) = trace_paths(world, &view, spp, settings.seed, &watch);
             let report =
                 Report { stages: vec![("image", start.elapsed().as_secs_f64())], ..Report::default() };
-            Ok(Outcome { film, finished, report, solution: None })
+            Ok(Outcome { film, finished, report })
         }
         Integrator::Hybrid => two_passes(world, &view, solution, settings, &watch),
     }
@@ -181,12 +197,13 @@ fn two_passes(
     settings: &Settings,
     watch: &Watch,
 ) -> Result<Outcome, radiosity::Error> {
+    let cameras = std::slice::from_ref(view.camera);
     let mut clock = Clock { last: Instant::now(), stages: Vec::new() };
     // What each pass is asked for: less than the user asks, once that was missed.
     let (mut mesh_error, mut noise_error) = (settings.error, settings.error * NOISE_SHARE.sqrt());
     let mut made = None;
     if solution.is_none() {
-        made = Some(prepass(world, settings, watch.progress)?);
+        made = Some(prepass_for(world, cameras, settings, watch.progress)?);
         clock.lap("prepass");
     }
     let (mut probes, mut repairs) = (None, 0);
@@ -236,9 +253,10 @@ fn two_passes(
                 report.texts.push(("error measured".into(), verdict.to_string()));
             }
             report.texts.push(("noise".into(), format!("{:.2} % estimated", 100.0 * noise)));
-            return Ok(Outcome { film, finished, report, solution: made });
+            return Ok(Outcome { film, finished, report });
         };
-        made = Some(prepass(world, &Settings { error: finer_mesh, ..settings.clone() }, watch.progress)?);
+        let finer = Settings { error: finer_mesh, ..settings.clone() };
+        made = Some(prepass_for(world, cameras, &finer, watch.progress)?);
         clock.lap("prepass");
     }
 }

@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use geometry::{Camera, Scene, World};
 use raytrace::exr::Metadata;
 use raytrace::verify::{Judgement, Verdict};
-use raytrace::{Integrator, Outcome, Progress, Settings, exr, prepass, render, tonemap};
+use raytrace::{Integrator, Outcome, Progress, Settings, exr, prepass_for, render, tonemap};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -63,15 +63,13 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
         if settings.integrator == Integrator::Hybrid && solution.is_none() {
             // Light does not know where we stand: one solution serves all views.
             solution = Some(
-                prepass(&world, &settings, &bars)
+                prepass_for(&world, &choice.cameras, &settings, &bars)
                     .with_context(|| format!("cannot solve {}", job.scene.display()))?,
             );
             shared.push(("prepass", lap(&mut clock)));
         }
         let mut outcome = render(&world, camera, solution.as_ref(), &settings, &bars)?;
         outcome.report.stages.extend(shared.drain(..));
-        // A solution that was found too coarse was made finer: the other views have it too.
-        solution = outcome.solution.take().or(solution);
         let rays = world.bvh.rays_cast();
         let rays = rays - std::mem::replace(&mut rays_before, rays);
         bars.done();
