@@ -136,10 +136,19 @@ pub enum DiffuseArg {
 
 /// Arguments of `inspect`.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  twolight inspect room.glb --json | jq .cameras")]
+#[command(after_help = "\
+Examples:
+  twolight inspect room.glb --json | jq .cameras
+  twolight inspect room.glb --plan --error 1%                what light is in it, and how it will be found")]
 pub struct InspectArgs {
     /// Scene, .gltf or .glb
     pub scene: PathBuf,
+    /// Say instead what light each camera sees, and how a render will find it
+    #[arg(long)]
+    pub plan: bool,
+    /// Error that the render would be asked for
+    #[arg(long, value_name = "PERCENT", default_value = "2%", requires = "plan", value_parser = values::share)]
+    pub error: f32,
     /// Print as JSON
     #[arg(long)]
     pub json: bool,

@@ -39,6 +39,7 @@ pub mod integrator;
 pub mod metrics;
 pub mod output;
 pub mod pixel;
+pub mod plan;
 pub mod render;
 pub mod tonemap;
 pub mod verify;

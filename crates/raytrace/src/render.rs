@@ -11,6 +11,7 @@ use crate::importance::importance;
 use crate::integrator::hybrid::Hybrid;
 use crate::integrator::path;
 use crate::pixel::{Effort, Shot, View, shade};
+use crate::plan::Plan;
 use crate::verify::{Judgement, Probes, Verdict};
 use geometry::sampling::Lattice2;
 use geometry::{Camera, World};
@@ -73,7 +74,7 @@ const NOISE_SHARE: f32 = 0.35;
 /// Every pixel's first effort.
 const FIRST: Effort = Effort { camera: 1, shadow: 4 };
 /// Rays through one pixel, and shadow rays for one surface, at most: the edge of a lamp before a dark wall wants many.
-const MOST_SAMPLES: u32 = 16_384;
+pub(crate) const MOST_SAMPLES: u32 = 16_384;
 /// Rounds of refinement at most.
 const MOST_ROUNDS: u32 = 6;
 /// Times at most that a picture which missed the error asked is made better.
@@ -200,12 +201,14 @@ fn two_passes(
     let cameras = std::slice::from_ref(view.camera);
     let mut clock = Clock { last: Instant::now(), stages: Vec::new() };
     // What each pass is asked for: less than the user asks, once that was missed.
-    let (mut mesh_error, mut noise_error) = (settings.error, settings.error * NOISE_SHARE.sqrt());
+    let (mut mesh_error, mut noise_error) = (settings.error, noise_goal(settings.error));
     let mut made = None;
     if solution.is_none() {
         made = Some(prepass_for(world, cameras, settings, watch.progress)?);
         clock.lap("prepass");
     }
+    let plan = Plan::new(world, view, settings.error, settings.seed);
+    clock.lap("plan");
     let (mut probes, mut repairs) = (None, 0);
     loop {
         let solution = made.as_ref().or(solution).expect("given or made");
@@ -249,6 +252,7 @@ fn two_passes(
                 radiosity: Some(solution.report.clone()),
                 verdict,
             };
+            report.texts.push(("plan".into(), plan.to_string()));
             if let Some(verdict) = verdict {
                 report.texts.push(("error measured".into(), verdict.to_string()));
             }
@@ -280,6 +284,11 @@ impl Clock {
     fn total(&self) -> f64 {
         self.stages.iter().map(|s| s.1).sum()
     }
+}
+
+/// Relative error that samples may leave in a picture of relative error `error`.
+pub(crate) fn noise_goal(error: f32) -> f32 {
+    error * NOISE_SHARE.sqrt()
 }
 
 /// What samples may leave as noise.
