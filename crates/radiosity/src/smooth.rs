@@ -83,15 +83,20 @@ pub(crate) fn smoothed(refiner: &Refiner, flags: &Flags, variance: &[f32]) -> Ve
             near().map(|s| variance[s as usize]).sum::<f32>() / near().count() as f32
         })
         .collect();
+    let level = crate::refine::mean(&refiner.e).mean();
     (0..refiner.e.len() as u32)
         .into_par_iter()
-        .map(|site| fit(refiner, &refiner.field, &graph, &pooled, site))
+        .map(|site| fit(refiner, &refiner.field, &graph, &pooled, level, site))
         .collect()
 }
 
 /// The site's value by the widest fit that agrees with the narrower ones.
-fn fit(refiner: &Refiner, field: &Field, graph: &Graph, variance: &[f32], site: u32) -> Rgb {
+fn fit(refiner: &Refiner, field: &Field, graph: &Graph, variance: &[f32], level: f32, site: u32) -> Rgb {
     let own = refiner.e[site as usize];
+    // What gathered next to nothing lies in the dark, behind a wall perhaps: no light may come to it from beyond.
+    if own.mean() <= 0.05 * level {
+        return own;
+    }
     let around = around(refiner, field, graph, site);
     let at = |s: u32| &refiner.elements.vertices[field.sites[s as usize].vertex as usize];
     let here = at(site);
