@@ -19,12 +19,21 @@ const EVEN: f32 = 0.2;
 
 /// How many rays to spend, and which strata this pixel takes of the pattern that its neighbours complete.
 #[derive(Clone, Copy, Debug)]
-pub struct Spend {
+pub struct Spend<'a> {
     /// Shadow rays for a light that brings all of the light: a power of four.
     pub samples: u32,
     /// Place in the 4 × 4 block of pixels, 0 … 15.
     pub phase: u32,
+    /// Points of the surface that shadow rays start from in turn, at least one: the edge of a shadow may run through the
+    /// pixel.
+    pub places: &'a [Vec3],
 }
+
+/// From one place to the next: no divisor of the numbers of places, which are powers of four and less, so that strata of
+/// the lamp and places do not go hand in hand.
+const STRIDE: usize = 7;
+/// Points at most that a point-like lamp is looked for from.
+const PLACES: usize = 64;
 
 /// Which lights are sampled at a point, how often.
 #[derive(Debug, Default)]
@@ -146,7 +155,10 @@ pub fn direct(
         let mut add = |part: &mut Part, samples: u32, sample: &dyn Fn([f32; 2]) -> Option<LightSample>| {
             for k in 0..samples {
                 match sample(stratum(k, samples, spend.phase, rng)) {
-                    Some(s) => part.add(world, surface, wo, &s, samples as f32, gloss, has_diffuse),
+                    Some(s) => {
+                        let from = spend.places[(k as usize * STRIDE) % spend.places.len()];
+                        part.add(world, surface, wo, &s, from, samples as f32, gloss, has_diffuse);
+                    }
                     None => part.count += 1,
                 }
             }
@@ -162,7 +174,8 @@ pub fn direct(
                         shape.radiance * (irradiance / shape.radiance.mean())
                     });
                 }
-                let samples = if matches!(kind, EmitterKind::Punctual(_)) { 1 } else { samples };
+                let punctual = matches!(kind, EmitterKind::Punctual(_));
+                let samples = if punctual { spend.places.len().min(PLACES) as u32 } else { samples };
                 let Some(seen) = world.emitters.seen_from(light, p) else { continue };
                 add(&mut part, samples, &|u| seen.sample(&world.scene, u));
             }
@@ -172,7 +185,7 @@ pub fn direct(
         }
         part.finish(exact, &mut out, &mut unshadowed);
     }
-    pooled(world, surface, wo, plan, gloss, spend.phase, rng, &mut out, &mut unshadowed);
+    pooled(world, surface, wo, plan, gloss, spend, rng, &mut out, &mut unshadowed);
     out.visible = if unshadowed > 0.0 { (out.irradiance.luminance() / unshadowed).min(1.0) } else { 1.0 };
     out
 }
@@ -197,6 +210,7 @@ impl Part {
         surface: &Surface,
         wo: Vec3,
         s: &LightSample,
+        from: Vec3,
         times: f32,
         gloss: Gloss,
         diffuse: bool,
@@ -210,7 +224,7 @@ impl Part {
         if arriving.is_black() && f_glossy.is_black() {
             return;
         }
-        let open = world.transmittance(&s.shadow_ray(surface.position, surface.ng));
+        let open = world.transmittance(&s.seen_from(surface.position, from).shadow_ray(from, surface.ng));
         if open.is_black() {
             return;
         }
@@ -279,7 +293,7 @@ fn pooled(
     wo: Vec3,
     plan: &Plan,
     gloss: Gloss,
-    phase: u32,
+    spend: Spend,
     rng: &mut Rng,
     out: &mut Direct,
     unshadowed: &mut f32,
@@ -289,7 +303,7 @@ fn pooled(
     for k in 0..plan.pool {
         // Neighbouring pixels choose in turn: the 4 × 4 of them take even shares of the groups.
         let strata = (16 * plan.pool) as f32;
-        let mut u = ((16 * k + phase) as f32 + rng.f32()) / strata;
+        let mut u = ((16 * k + spend.phase) as f32 + rng.f32()) / strata;
         let chosen = small().find(|e| {
             u -= e.chance;
             u < 0.0
@@ -299,7 +313,8 @@ fn pooled(
         match world.emitters.sample_group(&world.scene, group, surface.position, surface.ns, u) {
             Some(s) => {
                 let s = LightSample { pdf: s.pdf * chance, ..s };
-                part.add(world, surface, wo, &s, plan.pool as f32, gloss, surface.bsdf.has_diffuse());
+                let from = spend.places[(k as usize * STRIDE) % spend.places.len()];
+                part.add(world, surface, wo, &s, from, plan.pool as f32, gloss, surface.bsdf.has_diffuse());
             }
             None => part.count += 1,
         }

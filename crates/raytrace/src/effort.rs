@@ -91,7 +91,10 @@ pub fn relative(shots: &[Option<Shot>], noise: &[Noise]) -> (f32, Vec<f32>) {
     let weight = |(shot, noise): (&Option<Shot>, &Noise)| {
         let beauty = shot.as_ref().map(|s| s.pixel.beauty()).unwrap_or_default();
         let square = (beauty.r * beauty.r + beauty.g * beauty.g + beauty.b * beauty.b) / 3.0;
-        1.0 / (square + noise.camera + noise.light + 0.01 * m * m).max(1e-30)
+        // Noise is of the luminance, the metric of all channels alike: on a red wall seven times the luminance's.
+        let y = beauty.luminance();
+        let colour = if y > 0.0 { (square / (y * y)).clamp(1.0 / 3.0, 10.0) } else { 1.0 };
+        colour / (square + colour * (noise.camera + noise.light) + 0.01 * m * m).max(1e-30)
     };
     let weights: Vec<f32> = shots.par_iter().zip(noise).map(weight).collect();
     let sum: f64 = noise.iter().zip(&weights).map(|(n, w)| f64::from((n.camera + n.light) * w)).sum();
@@ -139,7 +142,12 @@ pub fn next(shots: &[Option<Shot>], noise: &[Noise], budget: &Budget) -> Vec<(u3
             let [camera, light] = stock.as_ref()?;
             // The same for a pixel in every round, lest a few more get their turn each time.
             let luck = Rng::new(0x6c75_636b, i as u64).f32();
-            let effort = Effort { camera: camera.next(worth, luck), shadow: light.next(worth, luck) };
+            let mut effort = Effort { camera: camera.next(worth, luck), shadow: light.next(worth, luck) };
+            if camera.cost == 1.0 {
+                // The edge of a shadow runs through the pixel as an edge of a surface does: shadow rays start from
+                // several points of it.
+                effort.camera = effort.camera.max(effort.shadow / 4).min(camera.most);
+            }
             (effort.camera > camera.n || effort.shadow > light.n).then_some((i as u32, effort))
         };
         let wanted: Vec<(u32, Effort)> = stocks.par_iter().enumerate().filter_map(more).collect();

@@ -70,7 +70,9 @@ pub struct Settings {
 }
 
 /// Of the square of the error asked, the share that samples may leave as noise; the rest is for the first pass.
-const NOISE_SHARE: f32 = 0.35;
+const NOISE_SHARE: f32 = 0.5;
+/// What the first pass is asked for, in units of the error asked.
+const MESH_SHARE: f32 = 0.85;
 /// Every pixel's first effort.
 const FIRST: Effort = Effort { camera: 1, shadow: 4 };
 /// Rays through one pixel, and shadow rays for one surface, at most: the edge of a lamp before a dark wall wants many.
@@ -152,7 +154,7 @@ pub fn prepass_for(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Solution, radiosity::Error> {
-    let mut config = Config { seed: settings.seed, ..Config::for_error(settings.error) };
+    let mut config = Config { seed: settings.seed, ..Config::for_error(MESH_SHARE * settings.error) };
     if let Some(rays) = settings.gather_rays {
         config.rays = rays;
     }

@@ -82,6 +82,16 @@ pub struct LightSample {
 }
 
 impl LightSample {
+    /// The same point of the light, drawn as seen from `p`, seen from `q` instead.
+    pub fn seen_from(&self, p: Vec3, q: Vec3) -> LightSample {
+        if !self.distance.is_finite() || p == q {
+            return *self;
+        }
+        let way = p + self.wi * self.distance - q;
+        let distance = way.length();
+        LightSample { wi: if distance > 0.0 { way / distance } else { self.wi }, distance, ..*self }
+    }
+
     /// From `p`, on a surface of unit geometric normal `ng` (zero in mid-air), to just before the light.
     pub fn shadow_ray(&self, p: Vec3, ng: Vec3) -> Ray {
         let side = if self.wi.dot(ng) < 0.0 { -ng } else { ng };

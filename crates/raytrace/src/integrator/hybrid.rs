@@ -90,7 +90,8 @@ impl Hybrid<'_> {
     /// The diffuse part of `surface`, and the lamps in its glossy lobes.
     ///
     /// - `phase`: see [`Spend`].
-    /// - `places`: points of the surface that caustics are averaged over, which may be finer than a pixel; at least one.
+    /// - `places`: points of the surface that caustics are averaged over, which may be finer than a pixel, and that shadow
+    ///   rays start from; at least one.
     pub fn diffuse(
         &self,
         surface: &Surface,
@@ -107,7 +108,15 @@ impl Hybrid<'_> {
         let lit = if from_vertices && gloss == Gloss::None {
             Direct { visible: 1.0, ..Direct::default() }
         } else if has_diffuse || gloss != Gloss::None {
-            direct(self.world, surface, wo, &plan, gloss, Spend { samples: quality.shadow, phase }, rng)
+            direct(
+                self.world,
+                surface,
+                wo,
+                &plan,
+                gloss,
+                Spend { samples: quality.shadow, phase, places },
+                rng,
+            )
         } else {
             Direct { visible: 1.0, ..Direct::default() }
         };
