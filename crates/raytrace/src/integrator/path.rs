@@ -224,16 +224,19 @@ impl<'a> Path<'a> {
         let bsdf = &surface.bsdf;
         let wo = -self.ray.direction;
         let sample = bsdf.sample(wo, rng.array());
-        // A rough pane is lit from both sides.
+        // A rough pane is lit from both sides, and so is what light comes through diffusely.
         let rough = !bsdf.is_delta();
-        let preference =
-            if rough && !bsdf.layers.transmission(1.0).is_black() { Vec3::ZERO } else { surface.ns };
+        let preference = if (rough && !bsdf.layers.transmission(1.0).is_black()) || bsdf.is_translucent() {
+            Vec3::ZERO
+        } else {
+            surface.ns
+        };
         let goes_straight = sample.is_some_and(|s| s.straight);
         if !goes_straight {
             self.look(surface, t);
         }
         // Drawn whether the path goes straight on or not: the lobes that scatter are lit by every path alike.
-        if self.light_sampling && (rough || bsdf.has_diffuse()) {
+        if self.light_sampling && (rough || bsdf.has_diffuse() || bsdf.is_translucent()) {
             self.next_event(surface, wo, preference, rng);
         }
         let s = sample?;
