@@ -6,10 +6,12 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use gltf::json;
+use gltf::json::validation::USize64;
 
 use super::error::Error;
 use super::limits::Limits;
 use super::uri::{self, Target};
+use super::{draco, meshopt};
 
 /// The parsed JSON with the bytes that it refers to.
 pub(super) struct Document {
@@ -38,6 +40,8 @@ impl Document {
         document.root = root;
         document.check_version()?;
         document.read_buffers(blob)?;
+        meshopt::decompress(&mut document)?;
+        draco::decompress(&mut document)?;
         Ok(document)
     }
 
@@ -64,28 +68,58 @@ impl Document {
         let view = self.root.buffer_views.get(i).ok_or_else(|| {
             self.fault(format_args!("{user}.bufferView"), i, "there is no buffer view of this number")
         })?;
-        let at = format_args!("bufferViews[{i}]");
-        let b = view.buffer.value();
-        let buffer = self.buffers.get(b).ok_or_else(|| {
-            self.fault(
-                format_args!("{at}.buffer"),
-                b,
-                format_args!("there is no buffer of this number ({user})"),
-            )
-        })?;
-        let buffer = buffer.as_deref().ok_or_else(|| {
-            self.fault(format_args!("buffers[{b}].uri"), "nothing", format_args!("needed by {user}"))
-        })?;
         let offset = view.byte_offset.unwrap_or_default().0;
-        let range = offset
-            .checked_add(view.byte_length.0)
-            .and_then(|end| Some(usize::try_from(offset).ok()?..usize::try_from(end).ok()?));
-        let bytes = range.and_then(|range| buffer.get(range)).ok_or_else(|| {
-            let value = format_args!("{offset} + {}", view.byte_length.0).to_string();
-            let problem = format!("ends beyond buffers[{b}], which has {} bytes ({user})", buffer.len());
-            self.fault(format_args!("{at}.byteOffset + byteLength"), value, problem)
-        })?;
+        let at = format_args!("bufferViews[{i}] ({user})").to_string();
+        let bytes = self.range(view.buffer.value() as u64, offset, view.byte_length.0, &at)?;
         Ok((bytes, view.byte_stride.map(|stride| stride.0)))
+    }
+
+    /// `length` bytes of a buffer from `offset` on, for what stands at the path `at`.
+    pub fn range(&self, buffer: u64, offset: u64, length: u64, at: &str) -> Result<&[u8], Error> {
+        let place = |member: &str| match at.split_once(' ') {
+            Some((path, user)) => format!("{path}.{member} {user}"),
+            None => format!("{at}.{member}"),
+        };
+        let bytes = usize::try_from(buffer)
+            .ok()
+            .and_then(|b| self.buffers.get(b))
+            .ok_or_else(|| self.fault(place("buffer"), buffer, "there is no buffer of this number"))?;
+        let bytes = bytes.as_deref().ok_or_else(|| {
+            self.fault(format_args!("buffers[{buffer}].uri"), "nothing", format_args!("needed by {at}"))
+        })?;
+        let range = offset
+            .checked_add(length)
+            .and_then(|end| Some(usize::try_from(offset).ok()?..usize::try_from(end).ok()?));
+        range.and_then(|range| bytes.get(range)).ok_or_else(|| {
+            let value = format_args!("{offset} + {length}").to_string();
+            let problem = format!("ends beyond buffers[{buffer}], which has {} bytes", bytes.len());
+            self.fault(place("byteOffset + byteLength"), value, problem)
+        })
+    }
+
+    /// A new buffer view over a new buffer of `bytes`, which count as if they had been read.
+    pub fn add_view(
+        &mut self,
+        at: &str,
+        bytes: Vec<u8>,
+        stride: Option<usize>,
+    ) -> Result<json::Index<json::buffer::View>, Error> {
+        let total = self.read.saturating_add(bytes.len() as u64);
+        self.within(at, "bytes to unpack in all", total, self.limits.bytes)?;
+        self.read = total;
+        let view = json::buffer::View {
+            buffer: json::Index::new(self.buffers.len() as u32),
+            byte_length: USize64(bytes.len() as u64),
+            byte_offset: None,
+            byte_stride: stride.map(json::buffer::Stride),
+            name: None,
+            target: None,
+            extensions: None,
+            extras: None,
+        };
+        self.buffers.push(Some(bytes));
+        self.root.buffer_views.push(view);
+        Ok(json::Index::new(self.root.buffer_views.len() as u32 - 1))
     }
 
     /// The bytes that `uri` leads to.
@@ -260,8 +294,8 @@ mod tests {
             document.view(json::Index::new(i), &"test").map(|(b, _)| b.to_vec()).map_err(|e| e.to_string())
         };
         assert_eq!(view(0), Ok(vec![3, 4]));
-        assert!(view(1).is_err_and(|e| e.contains("bufferViews[1].byteOffset + byteLength = 0 + 5")));
-        assert!(view(2).is_err_and(|e| e.contains("bufferViews[2].buffer = 1")));
+        assert!(view(1).is_err_and(|e| e.contains("bufferViews[1].byteOffset + byteLength (test) = 0 + 5")));
+        assert!(view(2).is_err_and(|e| e.contains("bufferViews[2].buffer (test) = 1")));
         assert!(view(3).is_err() && view(4).is_err_and(|e| e.contains("test.bufferView = 4")));
     }
 }

@@ -22,8 +22,8 @@ pub(super) fn read_all(document: &Document, warnings: &mut Warnings) -> Result<V
 }
 
 /// Every place where a material may refer to a texture.
-pub(super) fn texture_refs(m: &mut Material) -> [&mut Option<TextureRef>; 7] {
-    [
+pub(super) fn texture_refs(m: &mut Material) -> Vec<&mut Option<TextureRef>> {
+    let mut all = vec![
         &mut m.base_color_texture,
         &mut m.metallic_roughness_texture,
         &mut m.emissive_texture,
@@ -31,14 +31,38 @@ pub(super) fn texture_refs(m: &mut Material) -> [&mut Option<TextureRef>; 7] {
         &mut m.specular_texture,
         &mut m.specular_color_texture,
         &mut m.transmission_texture,
-    ]
+    ];
+    if let Some(c) = &mut m.clearcoat {
+        all.extend([&mut c.strength_texture, &mut c.roughness_texture, &mut c.normal_texture]);
+    }
+    if let Some(s) = &mut m.sheen {
+        all.extend([&mut s.color_texture, &mut s.roughness_texture]);
+    }
+    if let Some(a) = &mut m.anisotropy {
+        all.push(&mut a.texture);
+    }
+    if let Some(i) = &mut m.iridescence {
+        all.extend([&mut i.share_texture, &mut i.thickness_texture]);
+    }
+    if let Some(t) = &mut m.diffuse_transmission {
+        all.extend([&mut t.share_texture, &mut t.color_texture]);
+    }
+    all
 }
 
-struct Reader<'a> {
-    document: &'a Document,
-    warnings: &'a mut Warnings,
+/// The uv set along which the tangents of a material's meshes run; `None` where it needs none.
+pub(super) fn tangent_set(m: &Material) -> Option<u8> {
+    let coat = m.clearcoat.and_then(|c| c.normal_texture);
+    let brushed = m.anisotropy.map(|a| a.texture.map_or(0, |t| t.uv_set));
+    m.normal_texture.or(coat).map(|t| t.uv_set).or(brushed)
+}
+
+/// Reads one material.
+pub(super) struct Reader<'a> {
+    pub document: &'a Document,
+    pub warnings: &'a mut Warnings,
     /// Path of the material.
-    at: String,
+    pub at: String,
 }
 
 impl Reader<'_> {
@@ -116,6 +140,7 @@ impl Reader<'_> {
         if let Some(e) = &e.volume {
             m.volume = self.volume(e)?;
         }
+        self.lobes(m, &e.others)?;
         self.warn_of_others(&m.name, &e.others);
         Ok(())
     }
@@ -148,13 +173,17 @@ impl Reader<'_> {
         }
     }
 
-    fn texture(&mut self, at: &str, info: &Option<json::texture::Info>) -> Result<Option<TextureRef>, Error> {
+    pub(super) fn texture(
+        &mut self,
+        at: &str,
+        info: &Option<json::texture::Info>,
+    ) -> Result<Option<TextureRef>, Error> {
         let Some(info) = info else { return Ok(None) };
         let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
         self.reference(at, info.index, info.tex_coord, transform)
     }
 
-    fn reference(
+    pub(super) fn reference(
         &mut self,
         at: &str,
         index: json::Index<json::Texture>,
@@ -191,7 +220,7 @@ impl Reader<'_> {
     }
 
     /// Only normal textures need this: there the gltf crate leaves the extension as plain JSON.
-    fn parse_transform(
+    pub(super) fn parse_transform(
         &self,
         at: &str,
         value: &Value,
@@ -201,7 +230,7 @@ impl Reader<'_> {
     }
 
     /// `v`, clamped to [0, 1] with a warning.
-    fn unit(&mut self, at: &str, v: f32) -> Result<f32, Error> {
+    pub(super) fn unit(&mut self, at: &str, v: f32) -> Result<f32, Error> {
         let clamped = self.finite(at, v)?.clamp(0.0, 1.0);
         if clamped != v {
             self.clamped(at, v, clamped);
@@ -210,7 +239,7 @@ impl Reader<'_> {
     }
 
     /// `v`, raised to `low` with a warning.
-    fn at_least(&mut self, at: &str, v: f32, low: f32) -> Result<f32, Error> {
+    pub(super) fn at_least(&mut self, at: &str, v: f32, low: f32) -> Result<f32, Error> {
         let raised = self.finite(at, v)?.max(low);
         if raised != v {
             self.clamped(at, v, raised);
@@ -218,11 +247,11 @@ impl Reader<'_> {
         Ok(raised)
     }
 
-    fn color(&mut self, at: &str, [r, g, b]: [f32; 3]) -> Result<Rgb, Error> {
+    pub(super) fn color(&mut self, at: &str, [r, g, b]: [f32; 3]) -> Result<Rgb, Error> {
         Ok(Rgb::new(self.at_least(at, r, 0.0)?, self.at_least(at, g, 0.0)?, self.at_least(at, b, 0.0)?))
     }
 
-    fn finite(&self, at: &str, v: f32) -> Result<f32, Error> {
+    pub(super) fn finite(&self, at: &str, v: f32) -> Result<f32, Error> {
         if v.is_finite() { Ok(v) } else { Err(self.fault(at, v, "not a finite number")) }
     }
 
@@ -230,7 +259,12 @@ impl Reader<'_> {
         self.warnings.say(format!("{}.{at}: {v} is out of range and taken as {to}", self.at));
     }
 
-    fn fault(&self, at: &str, value: impl std::fmt::Display, problem: impl std::fmt::Display) -> Error {
+    pub(super) fn fault(
+        &self,
+        at: &str,
+        value: impl std::fmt::Display,
+        problem: impl std::fmt::Display,
+    ) -> Error {
         self.document.fault(format_args!("{}.{at}", self.at), value, problem)
     }
 }
@@ -278,8 +312,8 @@ mod tests {
     #[test]
     fn what_is_not_modelled_is_named() {
         let (_, warnings) =
-            material(r#"{"name":"Car","extensions":{"KHR_materials_clearcoat":{}}}"#).expect("valid");
-        assert!(warnings[0].contains("\"Car\"") && warnings[0].contains("KHR_materials_clearcoat"));
+            material(r#"{"name":"Car","extensions":{"ACME_materials_rust":{}}}"#).expect("valid");
+        assert!(warnings[0].contains("\"Car\"") && warnings[0].contains("ACME_materials_rust"));
     }
 
     #[test]
