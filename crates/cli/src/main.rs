@@ -7,6 +7,7 @@ mod args;
 mod cameras;
 mod commands;
 mod contents;
+mod doctor;
 mod job;
 mod load;
 mod progress;
