@@ -48,12 +48,12 @@ pub fn examine(world: &World, cameras: &[Camera], found: &mut Vec<Finding>) {
                 problem: format!("it is {:.4} m from {}", near.0, node_of(&world.scene.mesh, near.1)),
                 remedy: "move the camera away from what it touches",
             });
-        } else if hits == 0 {
+        } else if hits == 0 && !sees_anything(world, camera) {
             found.push(Finding {
                 severity: Severity::Doubtful,
                 kind: "camera",
                 place,
-                problem: "nothing is to be seen from there, in any direction".into(),
+                problem: "it sees nothing at all".into(),
                 remedy: "check the camera's place and the unit of lengths",
             });
         } else if backs * 10 > hits * 9 && hits * 2 > RAYS {
@@ -66,4 +66,12 @@ pub fn examine(world: &World, cameras: &[Camera], found: &mut Vec<Finding>) {
             });
         }
     }
+}
+
+/// Whether any of a grid of rays through the picture meets something.
+fn sees_anything(world: &World, camera: &Camera) -> bool {
+    const SIDE: u32 = 32;
+    let at = |i: u32| (i as f32 + 0.5) / SIDE as f32;
+    let aspect = camera.aspect.unwrap_or(1.0);
+    (0..SIDE * SIDE).any(|i| world.closest(&camera.ray(at(i % SIDE), at(i / SIDE), aspect)).is_some())
 }

@@ -19,7 +19,7 @@ pub fn materials(scene: &Scene, found: &mut Vec<Finding>) {
     for (i, m) in scene.materials.iter().enumerate().filter(|(i, _)| used[*i]) {
         let place = format!("materials[{i}] \"{}\"", m.name);
         let plain = m.base_color_texture.is_none() && scene.mesh.colors.is_empty();
-        if m.may_be_diffuse() && plain && !m.is_emissive() && reflects(m) > WHITEST {
+        if m.may_be_diffuse() && m.metallic < 1.0 && plain && !m.is_emissive() && reflects(m) > WHITEST {
             found.push(Finding {
                 severity: Severity::Doubtful,
                 kind: "albedo",

@@ -12,8 +12,11 @@ const LONG: f32 = 0.25;
 const PAIRS: usize = 48;
 /// Pairs that one wall must part.
 const ENOUGH: usize = 3;
-/// Heights over the triangle, as shares of the room: what stands in the way at all of them is a wall, not a table.
-const HEIGHTS: [f32; 4] = [0.002, 0.06, 0.14, 0.22];
+/// Heights over the triangle, as shares of the way to what lies opposite: what stands in the way at all of them is a
+/// wall, not a cupboard.
+const HEIGHTS: [f32; 5] = [0.01, 0.25, 0.5, 0.75, 0.97];
+/// Rooms are at least so high, as a share of the size of rooms.
+const HIGH: f32 = 0.2;
 /// Triangles at most, the largest: in a terrain of millions there is no room.
 const MOST: usize = 400;
 
@@ -61,21 +64,25 @@ pub fn examine(world: &World, found: &mut Vec<Finding>) {
     }
 }
 
-/// The part that stands between two points of a face at all heights, if one does and both are open above.
+/// The part that stands between two points of a face from there to the opposite side, if one does.
 fn parted(world: &World, a: Vec3, b: Vec3, n: Vec3) -> Option<u32> {
-    let top = HEIGHTS[HEIGHTS.len() - 1] * world.scale;
-    let open = |p: Vec3| !world.bvh.occluded(&Ray { t_max: top, ..Ray::new(p, n) });
+    // Where nothing lies opposite there is no room.
+    let height = |p: Vec3| world.closest(&Ray::new(p, n)).map(|hit| hit.t);
+    let height = height(a)?.min(height(b)?);
+    if height < HIGH * world.scale {
+        return None;
+    }
+    let way = b - a;
+    let direction = way.try_normalize()?;
     let mut wall = None;
-    for height in HEIGHTS {
-        let lift = n * (height * world.scale);
-        let way = b - a;
-        let ray = Ray { t_max: way.length(), ..Ray::new(a + lift, way.try_normalize()?) };
+    for share in HEIGHTS {
+        let ray = Ray { t_max: way.length(), ..Ray::new(a + n * (share * height), direction) };
         let part = part_of(world, world.closest(&ray)?.triangle)?;
         if *wall.get_or_insert(part) != part {
             return None;
         }
     }
-    if open(a) && open(b) { wall } else { None }
+    wall
 }
 
 fn part_of(world: &World, triangle: u32) -> Option<u32> {

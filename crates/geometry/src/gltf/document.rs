@@ -35,14 +35,18 @@ impl Document {
             Document { file: file.into(), root: json::Root::default(), limits, buffers: Vec::new(), read: 0 };
         let bytes = document.read_file(file)?;
         let container = |problem: String| Error::Container { file: file.into(), problem };
-        let (root, blob) = parse(&bytes).map_err(container)?;
-        drop(bytes);
+        let (root, blob) = parse(bytes).map_err(container)?;
         document.root = root;
         document.check_version()?;
         document.read_buffers(blob)?;
         meshopt::decompress(&mut document)?;
         draco::decompress(&mut document)?;
         Ok(document)
+    }
+
+    /// Lets go of all bytes, once everything has been decoded.
+    pub fn close(&mut self) {
+        self.buffers = Vec::new();
     }
 
     /// An [`Error::Value`] in this file.
@@ -203,9 +207,11 @@ impl Document {
 }
 
 /// JSON and the binary chunk of a GLB, or the JSON alone.
-fn parse(bytes: &[u8]) -> Result<(json::Root, Option<Vec<u8>>), String> {
+///
+/// The chunk is what is left of `bytes`: a file of a gigabyte need not be held twice.
+fn parse(mut bytes: Vec<u8>) -> Result<(json::Root, Option<Vec<u8>>), String> {
     if !bytes.starts_with(b"glTF") {
-        return Ok((parse_json(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes))?, None));
+        return Ok((parse_json(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes))?, None));
     }
     // What follows the length stated in the header is to be ignored (glTF 2.0, 4.4.1), which the gltf crate
     // does not; where the file is shorter than stated, it says so.
@@ -213,11 +219,17 @@ fn parse(bytes: &[u8]) -> Result<(json::Root, Option<Vec<u8>>), String> {
     if length < 12 {
         return Err(format!("GLB: a stated length of {length} bytes"));
     }
-    let glb = gltf::Glb::from_slice(bytes.get(..length).unwrap_or(bytes)).map_err(|e| match e {
+    let glb = gltf::Glb::from_slice(bytes.get(..length).unwrap_or(&bytes)).map_err(|e| match e {
         gltf::Error::Binary(e) => format!("GLB: {e}"),
         e => e.to_string(),
     })?;
-    Ok((parse_json(&glb.json)?, glb.bin.map(|bin| bin.into_owned())))
+    let root = parse_json(&glb.json)?;
+    let bin = glb.bin.as_ref().map(|bin| (bin.as_ptr() as usize - bytes.as_ptr() as usize, bin.len()));
+    drop(glb);
+    let Some((start, length)) = bin else { return Ok((root, None)) };
+    bytes.truncate(start + length);
+    bytes.drain(..start);
+    Ok((root, Some(bytes)))
 }
 
 fn parse_json(text: &[u8]) -> Result<json::Root, String> {
@@ -274,14 +286,14 @@ mod tests {
         let json = br#"{"asset":{"version":"2.0"}} "#;
         let mut glb = b"glTF\x02\0\0\0\x30\0\0\0\x1c\0\0\0JSON".to_vec();
         glb.extend(json);
-        assert!(parse(&glb).is_ok());
-        assert!(parse(&[&glb[..], b"tail"].concat()).is_ok());
-        assert!(parse(&glb[..glb.len() - 1]).is_err());
+        assert!(parse(glb.clone()).is_ok());
+        assert!(parse([&glb[..], b"tail"].concat()).is_ok());
+        assert!(parse(glb[..glb.len() - 1].to_vec()).is_err());
         for length in 0..20 {
             // In whatever place it ends, and whatever length the header states.
-            assert!(parse(&glb[..length]).is_err());
+            assert!(parse(glb[..length].to_vec()).is_err());
             glb[8] = length as u8;
-            assert!(parse(&glb).is_err());
+            assert!(parse(glb.clone()).is_err());
         }
     }
 

@@ -141,6 +141,10 @@ impl Reader<'_> {
             m.volume = self.volume(e)?;
         }
         self.lobes(m, &e.others)?;
+        if m.diffuse_transmission.is_some() && e.volume.is_some() && m.transmission == 0.0 {
+            let text = "materials shown as thin sheets: light scattered within their volume is not modelled";
+            self.warnings.count(text, format!("\"{}\"", m.name), 1);
+        }
         self.warn_of_others(&m.name, &e.others);
         Ok(())
     }

@@ -137,6 +137,7 @@ fn import(path: &Path, options: &Options) -> Result<Loaded, Error> {
 
     let uses = uses_of_meshes(&document, &placed, &pose)?;
     let (instances, triangles) = build(&document, &uses, variant, &mut scene, &mut warnings)?;
+    document.close();
     clean::clean(&mut scene, &mut warnings);
     if scene.mesh.triangles.is_empty() {
         warnings.say("the scene has no triangles");
@@ -265,7 +266,7 @@ fn build(
             let bent = bent.iter().map(|(places, deform)| (&places[..], Some(*deform)));
             for (places, deform) in plain.into_iter().chain(bent) {
                 instances += places.len() as u64;
-                let Some(primitive) = Primitive::read(document, json, &at, needs, deform)? else {
+                let Some(mut primitive) = Primitive::read(document, json, &at, needs, deform)? else {
                     warnings.count("points and lines are left out", &at, 1);
                     break;
                 };
@@ -275,9 +276,10 @@ fn build(
                 }
                 triangles += primitive.triangles.len() as u64 * places.len() as u64;
                 document.within(&at, "triangles", triangles, limit)?;
-                for (node, world) in places {
-                    let name = nodes::name(root, *node);
-                    let replaced = bake::append(&mut scene.mesh, &primitive, world, material, name, layout);
+                for (k, (node, world)) in places.iter().enumerate() {
+                    let (name, last) = (nodes::name(root, *node), k + 1 == places.len());
+                    let mesh = &mut scene.mesh;
+                    let replaced = bake::append(mesh, &mut primitive, last, world, material, name, layout);
                     warnings.count("normals replaced by that of a face: zero or not finite", &at, replaced);
                 }
             }
