@@ -6,13 +6,14 @@ use super::over::{self, Over};
 use super::shading::Film;
 use crate::Rgb;
 use std::f32::consts::FRAC_1_PI;
+use std::sync::Arc;
 
 /// f = ρ/π · (1 − E(θo)) (1 − E(θi)) / (1 − E̅), with E the directional albedo of what lies above, E̅ its mean.
 ///
 /// C. Kelemen and L. Szirmay-Kalos, "A Microfacet Based Coupled Specular-Matte BRDF Model with Importance Sampling",
 /// Eurographics 2001. Reciprocal; under uniform light it sends ρ (1 − E(θo)), just what the cover has left. Light from
 /// behind has the same form, and so has, with an E of its own, what wide microfacets lose (see `multiple`).
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Diffuse {
     base: Rgb,
     behind: Rgb,
@@ -25,7 +26,7 @@ pub struct Diffuse {
 }
 
 /// What keeps light off the base.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Cover {
     /// Width of the coat.
     pub alpha: f32,
@@ -38,14 +39,15 @@ pub struct Cover {
     /// A film on it.
     pub film: Option<Film>,
     /// What lies over the coat.
-    pub over: Option<Over>,
+    pub over: Option<Arc<Over>>,
 }
 
 impl Diffuse {
     /// - `base`, `behind`: reflectance and transmittance under the cover, [0, 1], metal and glass taken off.
     /// - `facets`: share of the light lost between facets that comes out, [0, 1]; black where they are narrow.
-    pub fn new(base: Rgb, behind: Rgb, facets: Rgb, cover: &Cover) -> Diffuse {
-        let mut out = Diffuse { base, behind, facets, cover: *cover, mean_passed: 1.0, mean_lost: 1.0 };
+    pub fn new(base: Rgb, behind: Rgb, facets: Rgb, cover: Cover) -> Diffuse {
+        let mut out = Diffuse { base, behind, facets, cover, mean_passed: 1.0, mean_lost: 1.0 };
+        let cover = &out.cover;
         if cover.film.is_some() || cover.over.is_some() {
             out.mean_passed = over::mean(|cos| out.passed(cos));
         } else if cover.specular > 0.0 {
@@ -56,9 +58,9 @@ impl Diffuse {
             (out.base, out.behind) = (Rgb::BLACK, Rgb::BLACK);
         }
         if !facets.is_black() {
-            out.mean_lost = match &cover.over {
+            out.mean_lost = match &out.cover.over {
                 Some(_) => over::mean(|cos| out.lost(cos)).max(1e-5),
-                None => 1.0 - albedo::hemispherical(cover.alpha).all,
+                None => 1.0 - albedo::hemispherical(out.cover.alpha).all,
             };
         }
         out
@@ -118,7 +120,7 @@ impl Diffuse {
 
     /// The lobe through the surface alone, as reflection: what the other side does with its light for this one.
     pub fn turned(&self) -> Diffuse {
-        Diffuse { base: self.behind, behind: Rgb::BLACK, facets: Rgb::BLACK, ..*self }
+        Diffuse { base: self.behind, behind: Rgb::BLACK, facets: Rgb::BLACK, ..self.clone() }
     }
 
     /// 1 − E: share of light along a direction that gets past the cover.

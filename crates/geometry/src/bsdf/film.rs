@@ -35,25 +35,16 @@ pub fn reflectance(film: &Film, f0: Rgb, cos: f32) -> Rgb {
         let base = (1.0 + root) / (1.0 - root);
         (schlick(normal(base, n), inside), if base < n { PI } else { 0.0 })
     };
-    // A dense film on a thin medium turns the phase at its outer face.
-    let turned = if n < 1.0 { 0.0 } else { PI };
     let base = [channel(f0.r), channel(f0.g), channel(f0.b)];
-    let mut out = [0.0; 3];
-    let mut between = [0.0; 3];
-    let mut order = [0.0; 3];
-    for c in 0..3 {
-        let r = (outer * base[c].0).clamp(0.0, 0.9999);
-        between[c] = r.sqrt();
-        let inner = through * through * base[c].0 / (1.0 - r);
-        out[c] = outer + inner;
-        order[c] = inner - through;
-    }
+    let between = base.map(|(r, _)| (outer * r).clamp(0.0, 0.9999).sqrt());
+    let inner: [f32; 3] =
+        std::array::from_fn(|c| through * through * base[c].0 / (1.0 - between[c] * between[c]));
+    let mut out = inner.map(|inner| outer + inner);
     for m in 1..=ORDERS {
-        let m = m as f32;
-        let seen = sensitivity(m * way, base.map(|(_, shift)| m * (turned + shift)));
-        for c in 0..3 {
-            order[c] *= between[c];
-            out[c] += order[c] * 2.0 * seen[c];
+        // Within the film, light is reflected at the outer face with its phase turned: the film is denser than air.
+        let seen = sensitivity(m as f32 * way, base.map(|(_, shift)| m as f32 * (PI + shift)));
+        for ((out, seen), (inner, between)) in out.iter_mut().zip(seen).zip(inner.iter().zip(between)) {
+            *out += (inner - through) * between.powi(m) * 2.0 * seen;
         }
     }
     Rgb::from(out).map(|v| v.clamp(0.0, 1.0))

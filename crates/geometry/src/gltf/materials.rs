@@ -302,6 +302,40 @@ mod tests {
     }
 
     #[test]
+    fn lobes_of_plain_json_reach_the_material() {
+        let json = r#"{"extensions":{
+            "KHR_materials_clearcoat":{"clearcoatFactor":1,"clearcoatRoughnessFactor":0.2,"clearcoatNormalTexture":{"index":0,"scale":0.5}},
+            "KHR_materials_sheen":{"sheenColorFactor":[1,0.5,0],"sheenRoughnessFactor":0.3},
+            "KHR_materials_anisotropy":{"anisotropyStrength":0.6,"anisotropyRotation":1.5},
+            "KHR_materials_iridescence":{"iridescenceFactor":1,"iridescenceThicknessMaximum":250},
+            "KHR_materials_diffuse_transmission":{"diffuseTransmissionFactor":0.4,"diffuseTransmissionTexture":{"index":0,"texCoord":1}}}}"#;
+        let (mut m, warnings) = material(json).expect("valid");
+        assert!(warnings.is_empty(), "{warnings:?}");
+        let coat = m.clearcoat.expect("varnished");
+        assert_eq!((coat.strength, coat.roughness, coat.normal_scale), (1.0, 0.2, 0.5));
+        assert_eq!(m.sheen.expect("fuzzy").color, Rgb::new(1.0, 0.5, 0.0));
+        assert_eq!(m.anisotropy.map(|a| (a.strength, a.rotation)), Some((0.6, 1.5)));
+        assert_eq!(m.iridescence.map(|f| (f.ior, f.thickness)), Some((1.3, [100.0, 250.0])));
+        assert_eq!(m.diffuse_transmission.map(|t| (t.share, t.color)), Some((0.4, Rgb::WHITE)));
+        assert_eq!((texture_refs(&mut m).into_iter().flatten().count(), tangent_set(&m)), (2, Some(0)));
+        // Without strength a lobe is not there, and nobody looks it up.
+        let none = r#"{"extensions":{"KHR_materials_clearcoat":{},"KHR_materials_sheen":{},"KHR_materials_iridescence":{}}}"#;
+        assert!(!material(none).expect("valid").0.has_lobes());
+        let wrong = r#"{"extensions":{"KHR_materials_sheen":{"sheenColorFactor":[1,"x",0]}}}"#;
+        assert!(material(wrong).is_err_and(|e| e.contains("KHR_materials_sheen.sheenColorFactor")));
+    }
+
+    #[test]
+    fn specular_glossiness_is_a_dielectric_of_any_f0() {
+        let json = r#"{"pbrMetallicRoughness":{"metallicFactor":1},"extensions":{"KHR_materials_pbrSpecularGlossiness":{
+            "diffuseFactor":[0.5,0.4,0.3,0.9],"specularFactor":[0.9,0.6,0.2],"glossinessFactor":0.7}}}"#;
+        let (m, _) = material(json).expect("valid");
+        assert_eq!((m.metallic, m.ior, m.alpha, m.glossiness), (0.0, 0.0, 0.9, None));
+        assert_eq!((m.base_color, m.specular_color), (Rgb::new(0.5, 0.4, 0.3), Rgb::new(0.9, 0.6, 0.2)));
+        assert!((m.roughness - 0.3).abs() < 1e-6);
+    }
+
+    #[test]
     fn factors_out_of_range_are_clamped_and_said() {
         let (m, warnings) =
             material(r#"{"pbrMetallicRoughness":{"roughnessFactor":-5,"baseColorFactor":[2,1,1,1]}}"#)
