@@ -164,19 +164,9 @@ fn kind(m: &Material) -> &'static str {
         m if m.metallic >= 1.0 && smooth => "mirror",
         m if m.metallic >= 1.0 => "metal",
         m if m.metallic > 0.0 => "part metal",
-        m if m.ior == 0.0 && m.specular_color.max_channel() < 0.2 => {
-            if smooth {
-                "varnished"
-            } else {
-                "glossy"
-            }
-        }
-        m if m.ior == 0.0 => {
-            if smooth {
-                "mirror"
-            } else {
-                "metal"
-            }
+        // Specular-glossiness, whose metals have bright coats.
+        m if m.ior == 0.0 && m.specular_color.max_channel() >= 0.2 => {
+            ["metal", "mirror"][usize::from(smooth)]
         }
         // Index 1 reflects nothing; 0 stands for the opposite.
         m if m.specular <= 0.0 || m.ior == 1.0 => "diffuse",

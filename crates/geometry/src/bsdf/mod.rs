@@ -139,7 +139,7 @@ impl Bsdf {
             }
         }
         let Some(over) = &l.over else { return f };
-        f = f * self.passed_both(over, o.z, i.z);
+        f *= self.passed_both(over, o.z, i.z);
         if same {
             f += over.eval_fuzz(o, i);
             if let Some(coat) = over.coat.filter(|c| c.alpha > 0.0) {

@@ -128,7 +128,7 @@ fn attributes(source: &[u8], count: usize, stride: usize) -> Option<Vec<u8>> {
     let mut last = source.get(source.len().checked_sub(stride)?..)?.to_vec();
     let data = r.0.len().checked_sub(tail)?;
     r.0 = &r.0[..data];
-    let block = (8192 / stride & !15).min(256);
+    let block = ((8192 / stride) & !15).min(256);
     let mut out = Vec::new();
     let mut lane = [0u8; 256];
     while out.len() < count * stride {
