@@ -7,8 +7,8 @@
 after glTF 2.0, appendix B, and KHR_materials_{ior, specular, transmission, volume}. The appendix leaves open
 how coat and base share the light; here the base carries (1 − E(wo)) (1 − E(wi)) / (1 − E̅), E being the
 coat's directional albedo (Kelemen and Szirmay-Kalos 2001). Below a roughness of 0.03 mirror and glass are
-perfect. Glass with a volume uses Fresnel's equations, everything else Schlick's. Light is scattered once
-between microfacets. Reflection is from both sides; thin glass and what alpha leaves out let light straight
+perfect. Glass with a volume uses Fresnel's equations, everything else Schlick's. What bounces between the
+microfacets of metals is given back, to a narrow lobe or to the diffuse light; that of glass is lost. Reflection is from both sides; thin glass and what alpha leaves out let light straight
 on; the light that a coloured volume swallows is taken off at the surface where it leaves, by the length of
 the way there. (Of light that ends on something inside the volume nothing is taken off.)
 
@@ -21,7 +21,7 @@ import math
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from mitsuba_layers import SMOOTH_ROUGHNESS, Layers
+from mitsuba_layers import FAINT, SMOOTH_ROUGHNESS, Layers
 from mitsuba_microfacets import Albedo, Ggx, fresnel
 
 INDEX_MATCHED = 1e-3  # an index this near 1 is taken as straight
@@ -80,6 +80,8 @@ class GltfBsdf(mi.BSDF):
         self.has_metal, self.has_coat = m.metallic > 0, m.specular > 0 and m.ior != 1
         self.has_diffuse = transmission < 1 and (m.metallic < 1 or bool(self.metallic_roughness_map))
         self.has_diffuse |= bool(self.transmission_map)
+        bright = m.metallic > 0 or max(self.f0 * c for c in m.specular_color) >= FAINT
+        self.has_diffuse |= bright and m.roughness > 0.3  # what wide facets lose
         self.passes = transmission > 0 and m.metallic < 1
         self.has_specular = self.has_metal or self.has_coat or self.passes
         textured = bool(self.metallic_roughness_map)
@@ -161,7 +163,7 @@ class GltfBsdf(mi.BSDF):
         """By how much each way carries, about."""
         if not self.has_diffuse or not self.has_specular:
             return mi.Float(1.0 if self.has_diffuse else 0.0)
-        diffuse = dr.max(layers.base) * layers.passed(cos_o)
+        diffuse = dr.max(layers.diffuse_share(cos_o))
         other = dr.max(layers.reflection(cos_o) + layers.passing(cos_o))
         return dr.select(diffuse + other > 0, diffuse / (diffuse + other), 1)
 
@@ -195,7 +197,8 @@ class GltfBsdf(mi.BSDF):
             shape = ggx.d(h) / (4 * o.z)
             mirrored = rough & same
             g2 = 1 / (1 + ggx.hidden(o) + ggx.hidden(i))
-            f[mirrored] += layers.reflection(oh) * (shape * g2 / i.z)
+            reflected = layers.reflection(oh) + layers.regained(oh, o.z, i.z)
+            f[mirrored] += reflected * (shape * g2 / i.z)
             reflect = self.chance_of_reflection(layers, oh)
             pdf[mirrored] += (1 - diffuse) * reflect * shape * ggx.g1(o)
             if self.passes:
@@ -250,7 +253,7 @@ class GltfBsdf(mi.BSDF):
         eye, _, ns, front = self.place(si, active)
         layers = Layers(self, si, front, active)
         cos = dr.dot(eye, ns)
-        total = layers.base * layers.passed(cos) + layers.reflection(cos) + layers.passing(cos)
+        total = layers.diffuse_share(cos) + layers.reflection(cos) + layers.passing(cos)
         return dr.select(active, dr.minimum(total, 1), 0)
 
     def sample(self, ctx, si, sample1, sample2, active=True):

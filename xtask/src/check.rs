@@ -31,6 +31,11 @@ const STEPS: &[Step] = &[
     },
     Step { name: "test", command: "cargo test --release --workspace", env: &[] },
     Step {
+        name: "fuzz",
+        command: "cargo run --release --quiet --package xtask -- fuzz --seconds 10",
+        env: &[],
+    },
+    Step {
         name: "pictures",
         command: "cargo run --release --quiet --package xtask -- reference-comparison --quick",
         env: &[],

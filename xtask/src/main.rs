@@ -1,10 +1,12 @@
 //! Our chores, as `cargo xtask NAME`.
 
 mod base64;
+mod bench_load;
 mod bench_rays;
 mod browser;
 mod check;
 mod comparison;
+mod fuzz;
 #[cfg(test)]
 mod ourselves;
 mod peers;
@@ -36,6 +38,8 @@ enum Chore {
         #[arg(long)]
         browser: bool,
     },
+    /// Spoil sound glTF files at random and load them: no panic, no hang, no hunger for memory
+    Fuzz(fuzz::Args),
     /// Compare speed and error with references and other renderers
     ReferenceComparison(comparison::Args),
     /// Run a program and write down its time and memory: for `reference-comparison`
@@ -56,6 +60,8 @@ enum Chore {
 
 #[derive(Subcommand)]
 enum Bench {
+    /// Seconds and memory that a large file takes to load
+    Load(bench_load::Args),
     /// Rays per second, beside Embree's where it is installed
     Rays(bench_rays::Args),
 }
@@ -68,9 +74,11 @@ enum Peers {
 
 fn main() -> Result<()> {
     match Args::parse().chore {
+        Chore::Bench(Bench::Load(args)) => bench_load::run(args),
         Chore::Bench(Bench::Rays(args)) => bench_rays::run(args),
         Chore::Check { without, browser } => check::run(&without, browser),
         Chore::ReferenceComparison(args) => comparison::run(args),
+        Chore::Fuzz(args) => fuzz::run(args),
         Chore::Measured(args) => comparison::measured(args),
         Chore::Peers { what: None } => peers::list(),
         Chore::Peers { what: Some(Peers::Install) } => peers::install(),

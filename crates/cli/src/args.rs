@@ -61,6 +61,8 @@ pub struct RenderArgs {
     /// Exposure value (EV at ISO 100) of the preview; automatic if absent, and then printed
     #[arg(long, value_name = "EV", requires = "preview", allow_negative_numbers = true, value_parser = values::number)]
     pub exposure: Option<f32>,
+    #[command(flatten)]
+    pub which: WhichArgs,
     /// Camera by name or by its number in `inspect`, or `all`; the first if absent
     #[arg(long, value_name = "NAME|NUMBER|all")]
     pub camera: Option<String>,
@@ -134,6 +136,20 @@ pub enum DiffuseArg {
     Gather,
 }
 
+/// What of a file to show.
+#[derive(Clone, Debug, Default, Args)]
+pub struct WhichArgs {
+    /// Scene by name or number; the file's default if absent
+    #[arg(long = "scene", value_name = "NAME|NUMBER", id = "which-scene")]
+    pub scene: Option<String>,
+    /// Variant of the materials by name (KHR_materials_variants); the default ones if absent
+    #[arg(long, value_name = "NAME")]
+    pub variant: Option<String>,
+    /// Time in the first animation, in seconds; the rest pose if absent
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = values::number)]
+    pub time: Option<f32>,
+}
+
 /// Arguments of `inspect`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -149,6 +165,8 @@ pub struct InspectArgs {
     /// Error that the render would be asked for
     #[arg(long, value_name = "PERCENT", default_value = "2%", requires = "plan", value_parser = values::share)]
     pub error: f32,
+    #[command(flatten)]
+    pub which: WhichArgs,
     /// Print as JSON
     #[arg(long)]
     pub json: bool,

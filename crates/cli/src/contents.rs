@@ -1,5 +1,6 @@
 //! What is in a scene, counted and in units: the data behind `inspect`.
 
+use crate::doctor::{self, Finding};
 use geometry::gltf::Loaded;
 use geometry::{Camera, LightKind, Material, Projection, Rgb, Scene, Sky, Texture};
 use serde::Serialize;
@@ -19,6 +20,10 @@ pub struct Contents {
     pub extensions_used: Vec<String>,
     /// Those without which it must not be shown.
     pub extensions_required: Vec<String>,
+    /// Scenes of the file, for `--scene`.
+    pub scenes: Vec<String>,
+    /// Variants of its materials, for `--variant`.
+    pub variants: Vec<String>,
     /// Triangles.
     pub triangles: usize,
     /// Vertices.
@@ -37,6 +42,8 @@ pub struct Contents {
     pub cameras: Vec<CameraRow>,
     /// What the loader had to say.
     pub warnings: Vec<String>,
+    /// What the doctor has to say.
+    pub findings: Vec<Finding>,
 }
 
 /// One material.
@@ -120,6 +127,11 @@ pub fn contents(path: &Path, loaded: &Loaded) -> Contents {
         copyright: loaded.facts.copyright.clone(),
         extensions_used: loaded.facts.extensions_used.clone(),
         extensions_required: loaded.facts.extensions_required.clone(),
+        scenes: (0..)
+            .zip(&loaded.facts.scenes)
+            .map(|(i, name): (usize, _)| name.clone().unwrap_or_else(|| i.to_string()))
+            .collect(),
+        variants: loaded.facts.variants.clone(),
         triangles: scene.mesh.triangles.len(),
         vertices: scene.mesh.positions.len(),
         parts: scene.mesh.parts.len(),
@@ -133,6 +145,7 @@ pub fn contents(path: &Path, loaded: &Loaded) -> Contents {
         lights: surfaces.chain(lamps(scene)).chain(sky(scene)).collect(),
         cameras: loaded.cameras.iter().map(camera).collect(),
         warnings: loaded.warnings.clone(),
+        findings: doctor::examine(loaded),
     }
 }
 
@@ -142,12 +155,19 @@ fn kind(m: &Material) -> &'static str {
     let smooth = m.roughness < 0.05;
     match m {
         m if m.unlit => "unlit",
-        m if m.transmission > 0.0 && m.volume.is_some() => "glass",
-        m if m.transmission > 0.0 => "thin glass",
+        m if m.clearcoat.is_some() => "clearcoat",
+        m if m.sheen.is_some() => "cloth",
+        m if m.diffuse_transmission.is_some() => "translucent",
+        m if m.may_transmit() && m.volume.is_some() => "glass",
+        m if m.may_transmit() => "thin glass",
         m if m.metallic_roughness_texture.is_some() => "textured gloss",
         m if m.metallic >= 1.0 && smooth => "mirror",
         m if m.metallic >= 1.0 => "metal",
         m if m.metallic > 0.0 => "part metal",
+        // Specular-glossiness, whose metals have bright coats.
+        m if m.ior == 0.0 && m.specular_color.max_channel() >= 0.2 => {
+            ["metal", "mirror"][usize::from(smooth)]
+        }
         // Index 1 reflects nothing; 0 stands for the opposite.
         m if m.specular <= 0.0 || m.ior == 1.0 => "diffuse",
         _ if smooth => "varnished",

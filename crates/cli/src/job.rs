@@ -1,6 +1,6 @@
 //! What was typed, checked: a job that can be done, or the reason why not.
 
-use crate::args::{DiffuseArg, IntegratorArg, RenderArgs};
+use crate::args::{DiffuseArg, IntegratorArg, RenderArgs, WhichArgs};
 use crate::values::SkyValue;
 use anyhow::Result;
 use geometry::Camera;
@@ -41,6 +41,8 @@ pub struct RenderJob {
     pub preview: Option<PathBuf>,
     /// Exposure value of the preview; automatic if absent.
     pub exposure: Option<f32>,
+    /// What of the file to show.
+    pub which: WhichArgs,
     /// Which camera, as typed.
     pub camera: Option<String>,
     /// Light from beyond the scene, and its factor.
@@ -111,6 +113,7 @@ impl RenderJob {
             output: args.output,
             preview: args.preview,
             exposure: args.exposure,
+            which: args.which,
             camera: args.camera,
             sky: args.sky.map(|sky| (sky, args.sky_strength)),
             json: args.json,

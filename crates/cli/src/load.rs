@@ -1,14 +1,20 @@
 //! Scene and sky from their files.
 
+use crate::args::WhichArgs;
+use crate::job::AskedWrongly;
 use crate::values::SkyValue;
 use anyhow::{Context, Result};
-use geometry::gltf::{self, Loaded};
+use geometry::gltf::{self, Error, Loaded, Options};
 use geometry::{Rgb, Sky};
 use std::path::Path;
 
-/// Reads a scene.
-pub fn scene(path: &Path) -> Result<Loaded> {
-    Ok(gltf::load(path)?)
+/// Reads a scene. A scene or variant that is not in the file was asked for wrongly.
+pub fn scene(path: &Path, which: &WhichArgs) -> Result<Loaded> {
+    let WhichArgs { scene, variant, time } = which.clone();
+    gltf::load_with(path, &Options { scene, variant, time, ..Options::default() }).map_err(|e| match e {
+        Error::NoSuch { .. } => AskedWrongly(e.to_string()).into(),
+        e => e.into(),
+    })
 }
 
 /// Makes the sky that was asked for, `strength` times as bright.

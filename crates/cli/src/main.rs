@@ -8,6 +8,7 @@ mod args;
 mod cameras;
 mod commands;
 mod contents;
+mod doctor;
 mod job;
 mod load;
 mod progress;

@@ -32,6 +32,7 @@ pub mod bvh;
 pub mod camera;
 pub mod emitter;
 pub mod gltf;
+pub mod lobes;
 pub mod math;
 pub mod mesh;
 pub mod optics;

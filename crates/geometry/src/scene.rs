@@ -1,5 +1,6 @@
 //! Meshes, materials, textures and lights: plain data, metres, world space.
 
+use crate::lobes::{Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Sheen};
 use crate::math::{Affine2, Vec3};
 use crate::{Mesh, Rgb, Sky, Texture};
 
@@ -69,6 +70,18 @@ pub struct Material {
     pub transmission_texture: Option<TextureRef>,
     /// Present when the surface bounds a volume and refracts; absent for a thin wall.
     pub volume: Option<Volume>,
+    /// Replaces the roughness by 1 − this · alpha of `specular_color_texture` (KHR_materials_pbrSpecularGlossiness).
+    pub glossiness: Option<f32>,
+    /// Diffuse light that comes through.
+    pub diffuse_transmission: Option<DiffuseTransmission>,
+    /// Brushed roughness.
+    pub anisotropy: Option<Anisotropy>,
+    /// A film that interferes.
+    pub iridescence: Option<Iridescence>,
+    /// Varnish.
+    pub clearcoat: Option<Clearcoat>,
+    /// Fuzz.
+    pub sheen: Option<Sheen>,
 }
 
 impl Default for Material {
@@ -97,6 +110,12 @@ impl Default for Material {
             transmission: 0.0,
             transmission_texture: None,
             volume: None,
+            glossiness: None,
+            diffuse_transmission: None,
+            anisotropy: None,
+            iridescence: None,
+            clearcoat: None,
+            sheen: None,
         }
     }
 }

@@ -7,7 +7,7 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use geometry::gltf::{Error, Loaded, load};
+use geometry::gltf::{Error, Loaded, Options, load, load_with};
 use geometry::math::{Vec2, Vec3};
 use geometry::{LightKind, Projection};
 
@@ -110,12 +110,6 @@ fn every_feature_model_loads_or_names_what_it_requires() {
                     "{name}"
                 );
             }
-            Err(Error::Extension { extension, .. }) => {
-                assert!(
-                    name.contains("Draco") || name.contains("draco") || name.contains("Meshopt"),
-                    "{name}: {extension}"
-                );
-            }
             // minVersion 2.1: made to be refused.
             Err(e) => assert!(name.contains("Compatibility_04"), "{e}"),
         }
@@ -172,6 +166,72 @@ fn quantized_and_plain_positions_agree() {
     let size = (b - a).length();
     assert!((a - c).length() < 1e-3 * size && (b - d).length() < 1e-3 * size, "{a} {b} and {c} {d}");
     assert_eq!(plain.scene.mesh.triangles.len(), quantized.scene.mesh.triangles.len());
+}
+
+#[test]
+fn compressed_and_plain_meshes_agree() {
+    let bounds = |loaded: &Loaded| loaded.scene.mesh.bounds().expect("triangles");
+    for (plain, packed) in [
+        ("Duck.glb", "Duck-draco/Duck.gltf"),
+        ("Box.glb", "BoxDraco/BoxDraco.gltf"),
+        ("Box.glb", "BoxMeshopt.glb"),
+    ] {
+        let (Some(a), Some(b)) = (feature(plain), feature(packed)) else { return };
+        let ((lo, hi), (lo2, hi2)) = (bounds(&a), bounds(&b));
+        let size = (hi - lo).length();
+        assert!(
+            (lo - lo2).length() < 2e-3 * size && (hi - hi2).length() < 2e-3 * size,
+            "{packed}: {lo2} {hi2}"
+        );
+        assert_eq!(a.scene.mesh.triangles.len(), b.scene.mesh.triangles.len(), "{packed}");
+        let area =
+            |l: &Loaded| (0..l.scene.mesh.triangles.len() as u32).map(|t| l.scene.mesh.area(t)).sum::<f32>();
+        assert!((area(&a) / area(&b) - 1.0).abs() < 5e-3, "{packed}: {} {}", area(&a), area(&b));
+    }
+}
+
+#[test]
+fn bent_meshes_stand_where_their_pose_puts_them() {
+    // The one triangle of SimpleMorph: weights 0.5 and 0.5 by default.
+    let Some(morph) = feature("SimpleMorph.gltf") else { return };
+    let high = |l: &Loaded| l.scene.mesh.bounds().expect("triangles").1.y;
+    eprintln!("morph: {:?}", morph.scene.mesh.positions);
+    let Some(folder) = folder("features") else { return };
+    let at = |name: &str, time: f32| {
+        let options = Options { time: Some(time), ..Options::default() };
+        load_with(&folder.join(name), &options).unwrap_or_else(|e| panic!("{e}"))
+    };
+    let tops: Vec<f32> = [0.0, 1.0, 2.0].map(|t| high(&at("SimpleMorph.gltf", t))).to_vec();
+    assert!(tops[0] != tops[1] && tops.iter().all(|t| t.is_finite()), "{tops:?}");
+    let (rest, bent) = (feature("RiggedSimple.glb").expect("there"), at("RiggedSimple.glb", 1.0));
+    let (a, b) = (rest.scene.mesh.bounds().expect("one"), bent.scene.mesh.bounds().expect("one"));
+    eprintln!("rigged: {a:?}, bent {b:?}");
+    assert!((a.0 - b.0).length() + (a.1 - b.1).length() > 0.1 && rest.scene.mesh.triangles.len() == 188);
+}
+
+#[test]
+fn variants_and_scenes_are_chosen_by_name() {
+    let Some(folder) = folder("features") else { return };
+    let file = folder.join("blender-18_variants/18_variants.gltf");
+    let plain = load(&file).unwrap_or_else(|e| panic!("{e}"));
+    assert!(plain.facts.variants.len() > 1, "{:?}", plain.facts.variants);
+    let colors: Vec<_> = plain
+        .facts
+        .variants
+        .iter()
+        .map(|name| {
+            let options = Options { variant: Some(name.clone()), ..Options::default() };
+            let loaded = load_with(&file, &options).unwrap_or_else(|e| panic!("{e}"));
+            loaded.scene.mesh.materials[0]
+        })
+        .collect();
+    assert!(colors.windows(2).any(|pair| pair[0] != pair[1]), "{colors:?}");
+    for options in [
+        Options { variant: Some("none such".into()), ..Options::default() },
+        Options { scene: Some("none such".into()), ..Options::default() },
+    ] {
+        assert!(matches!(load_with(&file, &options), Err(Error::NoSuch { .. })));
+    }
 }
 
 #[test]

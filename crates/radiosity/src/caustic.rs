@@ -182,7 +182,7 @@ fn targets(world: &World, elements: &Elements) -> Vec<(Vec3, f32)> {
         .scene
         .materials
         .iter()
-        .map(|m| m.roughness * m.roughness < ROUGH && m.has_specular(0.02))
+        .map(|m| m.sharpest_roughness().powi(2) < ROUGH && m.has_specular(0.02))
         .collect();
     let mut bounds: Vec<Option<(Vec3, Vec3)>> = vec![None; elements.pieces as usize];
     for (t, material) in mesh.materials.iter().enumerate() {
@@ -225,7 +225,7 @@ fn send(world: &World, targets: &[(Vec3, f32)], rng: &mut Rng, landed: &mut Vec<
             return;
         }
         let counted_by_gathering = specular == 0 || (specular == 1 && rough_first);
-        if !counted_by_gathering && surface.bsdf.has_diffuse() {
+        if !counted_by_gathering && (surface.bsdf.has_diffuse() || surface.bsdf.is_translucent()) {
             landed.push(Photon {
                 position: surface.position,
                 normal: surface.ng,

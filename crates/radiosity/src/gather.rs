@@ -57,11 +57,13 @@ pub fn follow(world: &World, mut ray: Ray, rng: &mut Rng, mut land: impl FnMut(&
         }
         let wo = -ray.direction;
         let albedo = surface.bsdf.diffuse_albedo(wo);
-        let (diffuse, gloss) = (albedo.luminance(), surface.bsdf.specular_albedo(wo).luminance());
+        let behind = surface.bsdf.translucent_albedo(wo);
+        let gloss = surface.bsdf.specular_albedo(wo).luminance();
+        let diffuse = albedo.luminance() + behind.luminance();
         if diffuse + gloss <= 0.0 {
             return out;
         }
-        if surface.bsdf.has_diffuse() {
+        if surface.bsdf.has_diffuse() || !behind.is_black() {
             out.arrived += throughput.mean();
         }
         let p_diffuse = diffuse / (diffuse + gloss);
@@ -70,9 +72,15 @@ pub fn follow(world: &World, mut ray: Ray, rng: &mut Rng, mut land: impl FnMut(&
         if chosen || rough {
             let scale = if chosen { 1.0 / p_diffuse } else { 0.0 };
             out.direct += throughput * lamps_through(world, &surface, wo, scale, rough, rng) * PI;
+            if let Some(turned) = surface.turned().filter(|_| chosen) {
+                out.direct += throughput * lamps_through(world, &turned, -wo, scale, false, rng) * PI;
+            }
         }
         if chosen {
             land(&hit, Side::met(surface.front), throughput * albedo * (1.0 / p_diffuse));
+            if !behind.is_black() {
+                land(&hit, Side::met(!surface.front), throughput * behind * (1.0 / p_diffuse));
+            }
             return out;
         }
         let u = [rng.f32(), rng.f32(), rng.f32()];

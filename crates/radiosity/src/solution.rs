@@ -103,19 +103,21 @@ fn balance(world: &World, refiner: &Refiner, extra: &[Rgb], direct: &[Rgb]) -> f
             let n = n * side.sign();
             let ray = Ray::new((a + b + c) / 3.0 + n, -n);
             let surface = Surface::new(&world.scene, &ray, &Hit { t: 1.0, triangle: t, u, v });
-            if !surface.bsdf.has_diffuse() {
+            let behind = surface.turned();
+            if !surface.bsdf.has_diffuse() && behind.is_none() {
                 continue;
             }
             let rho = surface.bsdf.diffuse_reflectance();
+            let tau = behind.map_or(Rgb::BLACK, |b| b.bsdf.diffuse_reflectance());
             for v in elements.nodes[leaf as usize].vertices {
-                let s = slot(v, side);
+                let (s, o) = (slot(v, side), slot(v, Side::BOTH[1 - side.index()]));
                 if !field.usable(s) {
                     continue;
                 }
-                let c = extra.get(s).copied().unwrap_or(Rgb::BLACK);
+                let light = |s: usize| e[s] + direct[s] + extra.get(s).copied().unwrap_or(Rgb::BLACK);
                 let weight = f64::from(area / 3.0);
                 arrived += weight * f64::from(e[s].mean());
-                left += weight * f64::from((rho * (e[s] + direct[s] + c)).mean() * kept[s].r);
+                left += weight * f64::from((rho * light(s) + tau * light(o)).mean() * kept[s].r);
             }
         }
     });

@@ -270,5 +270,6 @@ fn varies(world: &World, material: MaterialId) -> bool {
         || m.metallic_roughness_texture.is_some()
         || m.normal_texture.is_some()
         || m.emissive_texture.is_some()
+        || m.has_lobes()
         || !world.scene.mesh.colors.is_empty()
 }

@@ -129,7 +129,8 @@ impl Probes {
         let seed = seed ^ 0x0070_726f_6265;
         let cells = cells(view.width, view.height, seed);
         let weights = Weights::new(film);
-        let particles = Config::for_error(asked).photons;
+        // The probes are few, and other noise is larger.
+        let particles = Config::for_error(asked).photons / 4;
         let caustics = Caustics::trace(world, &Elements::new(&world.scene.mesh), particles, seed);
         let caustics = Some(&caustics).filter(|c| !c.is_empty());
         progress.stage("verifying", 2 * cells.len() as u64);

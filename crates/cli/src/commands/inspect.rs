@@ -15,7 +15,7 @@ use std::process::ExitCode;
 
 /// Runs the command.
 pub fn run(args: &InspectArgs) -> Result<ExitCode> {
-    let loaded = load::scene(&args.scene)?;
+    let loaded = load::scene(&args.scene, &args.which)?;
     if args.plan {
         return plan(args, loaded);
     }
@@ -63,6 +63,11 @@ impl Display for Contents {
             write!(f, "; {} x {} x {} m", short(size[0]), short(size[1]), short(size[2]))?;
             write!(f, " from ({})", lo.map(short).join(", "))?;
         }
+        for (what, names) in [("scenes", &self.scenes), ("variants", &self.variants)] {
+            if names.len() > 1 || (what == "variants" && !names.is_empty()) {
+                write!(f, "\n{what}: {}", names.join(", "))?;
+            }
+        }
         writeln!(f, "\n\nMaterials: {}", self.materials.len())?;
         for m in &self.materials {
             let [lo, hi] = m.base_color;
@@ -108,6 +113,12 @@ impl Display for Contents {
             writeln!(f, "\nWarnings: {}", self.warnings.len())?;
             for w in &self.warnings {
                 writeln!(f, "  {w}")?;
+            }
+        }
+        if !self.findings.is_empty() {
+            writeln!(f, "\nFindings: {}", self.findings.len())?;
+            for d in &self.findings {
+                writeln!(f, "  {}: {}\n    to do: {}", d.place, d.problem, d.remedy)?;
             }
         }
         Ok(())

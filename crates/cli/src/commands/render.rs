@@ -33,7 +33,7 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
 
     let mut clock = Instant::now();
     bars.stage("load", 0);
-    let mut loaded = load::scene(&job.scene)?;
+    let mut loaded = load::scene(&job.scene, &job.which)?;
     for warning in &loaded.warnings {
         bars.note(&format!("warning: {warning}"));
     }

@@ -1,73 +1,33 @@
 //! How strong each lobe of a material is: metal, coat, diffuse base, transmission.
 
-use super::albedo;
-use super::diffuse::Diffuse;
+use super::albedo::{self, Directional};
+use super::diffuse::{Cover, Diffuse};
+use super::film;
+use super::ggx::{Ggx, SMOOTH_ROUGHNESS};
+use super::glass::{self, Spread};
+use super::multiple;
+use super::over::Over;
+use super::shading::{Film, Shading, is_index_matched};
 use crate::Rgb;
 use crate::optics::{f0_from_ior, fresnel_dielectric, schlick};
+use std::sync::Arc;
 
-/// Perceptual roughness below which mirror and glass are perfect: α = 9·10⁻⁴, a blur of 0.05°.
-pub const SMOOTH_ROUGHNESS: f32 = 0.03;
-
-/// An index this close to 1 bends nothing that one could see, yet makes rough refraction ill-conditioned.
-const INDEX_MATCHED: f32 = 1e-3;
-
-/// A material's parameters at one point, textures and vertex colours applied; factors as in glTF.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shading {
-    /// Linear, [0, 1].
-    pub base_color: Rgb,
-    /// [0, 1].
-    pub metallic: f32,
-    /// Perceptual, [0, 1].
-    pub roughness: f32,
-    /// Index of refraction, > 0, relative to the outside; 0 means a Fresnel term of 1.
-    pub ior: f32,
-    /// Strength of the dielectric coat, [0, 1].
-    pub specular: f32,
-    /// Tint of the dielectric F0, ≥ 0.
-    pub specular_color: Rgb,
-    /// Share of the light below the coat that passes through instead of meeting the diffuse base, [0, 1].
-    pub transmission: f32,
-    /// Whether the surface bounds a volume and refracts; a thin wall otherwise.
-    pub solid: bool,
-}
-
-impl Shading {
-    /// Whether a ray passes straight on: smooth thin glass, or a volume with the index of its surroundings.
-    pub fn is_straight(&self) -> bool {
-        self.transmission > 0.0
-            && self.metallic < 1.0
-            && if self.solid { is_index_matched(self.ior) } else { self.roughness < SMOOTH_ROUGHNESS }
-    }
-}
-
-/// Whether a volume of index `ior` bends nothing that one could see; it is then treated as smooth and straight.
-pub fn is_index_matched(ior: f32) -> bool {
-    (ior - 1.0).abs() < INDEX_MATCHED
-}
-
-impl Default for Shading {
-    /// A white Lambertian surface: no coat, no metal, no transmission.
-    fn default() -> Self {
-        Shading {
-            base_color: Rgb::WHITE,
-            metallic: 0.0,
-            roughness: 1.0,
-            ior: 1.5,
-            specular: 0.0,
-            specular_color: Rgb::WHITE,
-            transmission: 0.0,
-            solid: false,
-        }
-    }
-}
+/// What glass loses between its facets on the average where it is too little for a lobe of its own.
+const FAINT: f32 = 0.004;
 
 /// The lobes of one side of a surface: how much each carries, by the cosine to the microfacet's normal.
 #[derive(Clone, Debug)]
 pub struct Layers {
-    /// The Lambertian base under the coat.
+    /// The diffuse light under the coat.
     pub(super) diffuse: Diffuse,
-    /// GGX width; 0 for perfect lobes.
+    /// What lies over everything else; elsewhere in memory, for few materials have it (inside, it cost the others 3 %
+    /// of their time).
+    pub(super) over: Option<Arc<Over>>,
+    /// What rough glass scatters more than once.
+    pub(super) spread: Option<Spread>,
+    /// The microfacets; meaningless for perfect lobes.
+    pub(super) ggx: Ggx,
+    /// Their width all round; 0 for perfect lobes.
     alpha: f32,
     base_color: Rgb,
     metal: f32,
@@ -82,6 +42,9 @@ pub struct Layers {
     solid: f32,
     /// n on wo's side over n on the other; 1 for a thin wall.
     eta: f32,
+    /// What the lobes of metal and coat get back of the light lost between narrow facets; black for none.
+    regained: [Rgb; 2],
+    film: Option<Film>,
 }
 
 impl Layers {
@@ -95,7 +58,7 @@ impl Layers {
         let solid = if s.solid { dielectric * transmission } else { 0.0 };
         let thin = if s.solid { 0.0 } else { dielectric * transmission };
         let smooth = s.roughness < SMOOTH_ROUGHNESS || (solid > 0.0 && matched);
-        let alpha = if smooth { 0.0 } else { s.roughness * s.roughness };
+        let (ggx, alpha) = if smooth { (Ggx::round(1.0), 0.0) } else { widths(s) };
         let eta = if solid == 0.0 || matched {
             1.0
         } else if front {
@@ -106,19 +69,45 @@ impl Layers {
         // Without a step of the index there is no interface to reflect; Schlick's formula would, at grazing angles.
         let specular = if s.ior == 1.0 { 0.0 } else { s.specular };
         let f0 = (s.specular_color * f0_from_ior(s.ior)).min(Rgb::WHITE);
+        let coat = dielectric - solid;
+        let of_metal = if s.metallic > 0.0 { multiple::regained(alpha, s.base_color) } else { Rgb::BLACK };
+        let of_coat = if coat * specular > 0.0 { multiple::regained(alpha, f0) } else { Rgb::BLACK };
+        let (mut facets, mut regained) = (Rgb::BLACK, [of_metal, of_coat]);
+        if (s.metallic > 0.0 || !of_coat.is_black()) && multiple::is_wide(alpha) {
+            facets = of_metal * s.metallic + of_coat * (coat * specular);
+            regained = [Rgb::BLACK; 2];
+        }
+        let through = if alpha > 0.0 && thin + solid > 0.0 {
+            let spread = Spread::new(alpha, eta, solid == 0.0);
+            (spread.mean_lost() > FAINT).then_some(spread)
+        } else {
+            None
+        };
+        // Varnish on a solid is on its outside.
+        let over = if solid > 0.0 && !front { None } else { Over::new(s).map(Arc::new) };
         let base = s.base_color * (dielectric * (1.0 - transmission));
+        let film = s.film.filter(|f| f.share > 0.0);
+        let cover = Cover { alpha, specular, f0, regained: of_coat.max_channel(), film, over: over.clone() };
+        let (share, color) = s.translucency.map_or((0.0, Rgb::BLACK), |t| (t.share, t.color));
+        let behind = color * (share * dielectric * (1.0 - transmission));
+        let diffuse = Diffuse::new(base * (1.0 - share), behind, facets, cover);
         Layers {
-            diffuse: Diffuse::new(base, alpha, specular, f0.max_channel()),
+            diffuse,
+            over,
+            spread: through,
+            ggx,
             alpha,
             base_color: s.base_color,
             metal: s.metallic,
-            coat: dielectric - solid,
+            coat,
             f0,
             specular,
             specular_color: s.specular_color,
             thin,
             solid,
             eta,
+            regained,
+            film,
         }
     }
 
@@ -137,12 +126,12 @@ impl Layers {
         self.solid > 0.0
     }
 
-    /// Whether reflection and transmission are perfect.
+    /// Whether reflection and transmission of what lies below clearcoat and fuzz are perfect.
     pub fn is_delta(&self) -> bool {
         self.alpha == 0.0
     }
 
-    /// Whether there is any lobe other than diffuse.
+    /// Whether there is any lobe other than diffuse below clearcoat and fuzz.
     pub fn has_specular(&self) -> bool {
         // Schlick's term reaches 1 at grazing angles whatever F0, so only the strength decides.
         self.metal > 0.0 || self.specular * self.coat > 0.0 || self.thin + self.solid > 0.0
@@ -150,59 +139,133 @@ impl Layers {
 
     /// Share of the light on a microfacet that it reflects, [0, 1]; `cos`: from its normal to either direction.
     pub fn reflection(&self, cos: f32) -> Rgb {
-        let mut sum = schlick(self.base_color, cos) * self.metal;
-        sum += schlick(self.f0, cos) * (self.coat * self.specular);
+        let mut sum = self.schlick(self.base_color, cos) * self.metal;
+        sum += self.schlick(self.f0, cos) * (self.coat * self.specular);
         if self.solid > 0.0 {
             sum += self.glass(cos) * self.solid;
         }
         sum
     }
 
+    /// What [`Layers::reflection`] at a facet that makes `cos` with both directions gains by light that bounces between
+    /// facets, where the lobe is narrow enough to be made stronger by it.
+    pub fn regained(&self, cos: f32, cos_o: f32, cos_i: f32) -> Rgb {
+        if self.regained[0].is_black() && self.regained[1].is_black() {
+            return Rgb::BLACK;
+        }
+        let mut sum = self.schlick(self.base_color, cos) * self.regained[0] * self.metal;
+        sum += self.schlick(self.f0, cos) * self.regained[1] * (self.coat * self.specular);
+        sum * multiple::strengthening(self.alpha, cos_o, cos_i)
+    }
+
     /// Share of the light on a microfacet that it lets through, tinted, [0, 1]; without the η² of radiance.
     pub fn transmission(&self, cos: f32) -> Rgb {
         if self.solid > 0.0 {
-            self.base_color * (self.solid * (1.0 - self.glass(cos).max_channel()))
+            self.base_color * self.left(self.glass(cos)) * self.solid
         } else if self.thin > 0.0 {
-            self.base_color * (self.thin * (1.0 - self.specular * schlick(self.f0, cos).max_channel()))
+            self.base_color * self.left(self.schlick(self.f0, cos) * self.specular) * self.thin
         } else {
             Rgb::BLACK
         }
     }
 
-    /// Share of light from everywhere that reflection and transmission together send to `cos_o`.
+    /// Share of light that a perfect lobe lets through at `cos`, all layers passed.
+    pub fn straight(&self, cos: f32) -> Rgb {
+        self.transmission(cos) * self.over.as_ref().map_or(1.0, |over| over.passed(cos))
+    }
+
+    /// Share of the light lost between the facets of glass that comes back, and that goes through.
+    pub fn spread_colors(&self) -> [Rgb; 2] {
+        let share = self.thin + self.solid;
+        [Rgb::splat(share), self.base_color * share]
+    }
+
+    /// Share of light from everywhere that reflection and transmission together send to `cos_o`, as if nothing lay over
+    /// them.
     pub fn specular_albedo(&self, cos_o: f32) -> Rgb {
         if cos_o <= 0.0 || !self.has_specular() {
             return Rgb::BLACK;
         }
         let scattered = albedo::directional(self.alpha, cos_o);
-        let mut sum = scattered.under_schlick(self.base_color) * self.metal;
-        sum += scattered.under_schlick(self.f0) * (self.coat * self.specular);
+        let narrow = 1.0 / scattered.all.max(0.5) - 1.0;
+        let again = |regained: Rgb| Rgb::WHITE + regained * narrow;
+        let under = |f0: Rgb| scattered.under(f0, self.film.as_ref());
+        let mut sum = under(self.base_color) * again(self.regained[0]) * self.metal;
+        sum += under(self.f0) * again(self.regained[1]) * (self.coat * self.specular);
         if self.thin > 0.0 {
-            let reflected = self.specular * scattered.under_schlick(self.f0).max_channel();
-            sum += self.base_color * (self.thin * (scattered.all - reflected));
+            let passed = self.left(under(self.f0) * self.specular) - Rgb::splat(1.0 - scattered.all);
+            sum += self.base_color * passed * self.thin;
         }
         if self.solid > 0.0 {
-            let reflected = |cos| self.glass(cos) * self.solid;
-            let passed = |cos| self.transmission(cos);
             sum += if self.is_delta() {
-                reflected(cos_o) + passed(cos_o)
+                self.glass(cos_o) * self.solid + self.transmission(cos_o)
             } else {
-                albedo::rough_glass(self.alpha, self.eta, cos_o, reflected, passed)
+                let once = glass::once(self.alpha, self.eta, cos_o);
+                let tint = (self.specular_color * self.specular).min(Rgb::WHITE);
+                let reflected = tint * once.reflected;
+                let passed = once.passed + once.reflected * (1.0 - tint.max_channel());
+                (reflected + self.base_color * passed) * self.solid
             };
         }
+        if let Some(spread) = &self.spread {
+            let [back, through] = self.spread_colors();
+            sum += (back * spread.back + through * (1.0 - spread.back)) * spread.lost(cos_o, false);
+        }
         sum
+    }
+
+    /// What a facet that reflects `reflected` lets in. A tinted coat keeps off what its strongest channel says
+    /// (KHR_materials_specular); the colours of a film are each other's complement.
+    fn left(&self, reflected: Rgb) -> Rgb {
+        match self.film {
+            None => Rgb::splat(1.0 - reflected.max_channel()),
+            Some(_) => Rgb::WHITE - reflected,
+        }
+    }
+
+    /// Schlick's term, or that of the film for its share of the surface.
+    fn schlick(&self, f0: Rgb, cos: f32) -> Rgb {
+        match &self.film {
+            None => schlick(f0, cos),
+            Some(f) => schlick(f0, cos).lerp(film::reflectance(f, f0, cos), f.share),
+        }
     }
 
     /// Fresnel reflectance of solid glass; the specular factors dim and tint it except where all is reflected.
     fn glass(&self, cos: f32) -> Rgb {
         let f = fresnel_dielectric(cos, self.eta);
-        if f >= 1.0 { Rgb::WHITE } else { (self.specular_color * f).min(Rgb::WHITE) * self.specular }
+        if f >= 1.0 {
+            return Rgb::WHITE;
+        }
+        let plain = (self.specular_color * f).min(Rgb::WHITE) * self.specular;
+        let Some(film) = &self.film else { return plain };
+        // From within, the film is met as from without at the angle that light leaves by.
+        let sin2 = (1.0 - cos * cos) * self.eta * self.eta;
+        let outside = if self.eta > 1.0 { (1.0 - sin2).max(0.0).sqrt() } else { cos };
+        plain.lerp(film::reflectance(film, self.f0, outside) * self.specular, film.share)
     }
 }
 
-impl albedo::Directional {
-    /// With Schlick's Fresnel term of the given F0.
-    fn under_schlick(self, f0: Rgb) -> Rgb {
-        f0.map(|f0| self.with_f0(f0))
+/// Widths along tangent and bitangent, and the mean (KHR_materials_anisotropy, "Anisotropy Direction and Strength").
+fn widths(s: &Shading) -> (Ggx, f32) {
+    let alpha = s.roughness * s.roughness;
+    match s.anisotropy {
+        None => (Ggx::round(alpha), alpha),
+        Some((strength, _)) => {
+            let x = alpha + (1.0 - alpha) * strength * strength;
+            // The round lobe of this width loses between its facets as much as this one, to 3 % of the light.
+            (Ggx { x, y: alpha }, (0.5 * (x * x + alpha * alpha)).sqrt())
+        }
+    }
+}
+
+impl Directional {
+    /// Albedo of facets of reflectance `f0` at normal incidence, with the film's colours where there is one.
+    pub(super) fn under(self, f0: Rgb, film: Option<&Film>) -> Rgb {
+        let plain = f0.map(|f0| self.with_f0(f0));
+        let Some(film) = film else { return plain };
+        // Facets are met at this cosine, by the mean of Schlick's (1 − cos)⁵ over them.
+        let cos = 1.0 - (self.grazing / self.all.max(1e-6)).clamp(0.0, 1.0).powf(0.2);
+        plain.lerp(film::reflectance(film, f0, cos) * self.all, film.share)
     }
 }

@@ -4,16 +4,7 @@ use super::*;
 use crate::sampling::{self, Rng};
 use std::f32::consts::PI;
 
-const WHITE_LAMBERT: Shading = Shading {
-    base_color: Rgb::WHITE,
-    metallic: 0.0,
-    roughness: 1.0,
-    ior: 1.5,
-    specular: 0.0,
-    specular_color: Rgb::WHITE,
-    transmission: 0.0,
-    solid: false,
-};
+const WHITE_LAMBERT: Shading = Shading::LAMBERT;
 const PLASTIC: Shading = Shading { specular: 1.0, ..WHITE_LAMBERT };
 const METAL: Shading = Shading { metallic: 1.0, ..PLASTIC };
 const WINDOW: Shading = Shading { transmission: 1.0, roughness: 0.0, ..PLASTIC };
@@ -40,9 +31,64 @@ fn families() -> Vec<Shading> {
             of(Shading { ior: 0.889, ..GLASS }),
             of(Shading { ior: 0.0, ..PLASTIC }),
             of(Shading { ior: 0.0, ..GLASS }),
+            of(Shading {
+                ior: 0.0,
+                specular_color: Rgb::new(0.9, 0.6, 0.2),
+                base_color: Rgb::BLACK,
+                ..PLASTIC
+            }),
+        ]);
+    }
+    all.extend(with_lobes());
+    all
+}
+
+const VARNISH: Option<Clearcoat> = Some(Clearcoat { strength: 1.0, roughness: 0.0, normal: Vec3::Z });
+const DULL: Option<Clearcoat> = Some(Clearcoat { strength: 0.7, roughness: 0.4, normal: Vec3::Z });
+const VELVET: Option<Sheen> = Some(Sheen { color: Rgb::new(1.0, 0.5, 0.2), roughness: 0.5 });
+const SOAP: Option<Film> = Some(Film { share: 1.0, ior: 1.4, thickness: 420.0 });
+const PAPER: Option<Translucency> = Some(Translucency { share: 0.4, color: Rgb::new(1.0, 0.9, 0.5) });
+
+/// The lobes that few materials have, alone and together.
+fn with_lobes() -> Vec<Shading> {
+    let mut all = vec![];
+    for roughness in [0.0, 0.3, 0.8] {
+        let of = |s: Shading| Shading { roughness, ..s };
+        all.extend([
+            of(Shading { clearcoat: VARNISH, ..PLASTIC }),
+            of(Shading { clearcoat: VARNISH, ..METAL }),
+            of(Shading { clearcoat: DULL, ..WHITE_LAMBERT }),
+            of(Shading { clearcoat: DULL, ..METAL }),
+            of(Shading { sheen: VELVET, ..PLASTIC }),
+            of(Shading { sheen: VELVET, clearcoat: VARNISH, ..METAL }),
+            of(Shading { film: SOAP, ..PLASTIC }),
+            of(Shading { film: SOAP, base_color: Rgb::splat(0.6), ..METAL }),
+            of(Shading { film: SOAP, ..WINDOW }),
+            of(Shading { film: SOAP, ..GLASS }),
+            of(Shading { translucency: PAPER, ..WHITE_LAMBERT }),
+            of(Shading { translucency: PAPER, clearcoat: DULL, ..PLASTIC }),
+            of(Shading { anisotropy: Some((0.8, Vec3::X)), ..METAL }),
+            of(Shading { anisotropy: Some((1.0, Vec3::new(1.0, 1.0, 0.2))), ..PLASTIC }),
+            of(Shading { anisotropy: Some((0.5, Vec3::Y)), ..GLASS }),
         ]);
     }
     all
+}
+
+/// How far tables and their fits are off: anisotropic lobes have the albedo of round ones of the mean width.
+fn slack(shading: &Shading) -> f32 {
+    let over = shading.clearcoat.is_some() || shading.sheen.is_some();
+    let film = shading.film.is_some();
+    if film && shading.metallic > 0.0 {
+        // Its colour over the lobe is guessed from one angle; nothing but the choice of lobes hangs on it.
+        0.16
+    } else if shading.anisotropy.is_some() || (over && shading.metallic > 0.0) {
+        0.12
+    } else if over || film {
+        0.06
+    } else {
+        0.0
+    }
 }
 
 fn bsdf(shading: &Shading, front: bool) -> Bsdf {
@@ -66,19 +112,49 @@ fn furnace(bsdf: &Bsdf, wo: Vec3, n: u32) -> Rgb {
 
 #[test]
 fn no_material_makes_light_and_the_albedos_say_how_much_it_sends() {
+    let mut worst = [0f32; 2];
     for shading in families() {
         for (cos, front) in [(1.0, true), (0.6, true), (0.2, false), (0.7, false), (0.05, true)] {
             // Importance: flux in, flux out, without the η² that radiance gains in a denser medium.
             let bsdf = bsdf(&shading, front).with_transport(Transport::Importance);
             let wo = direction(cos);
             let sent = furnace(&bsdf, wo, 4000);
-            // Table ±0.005, 4000 quasi-random samples ±0.005.
-            assert!(sent.max_channel() < 1.01, "{shading:?} at {cos}: {sent:?}");
-            let stated = bsdf.diffuse_albedo(wo) + bsdf.specular_albedo(wo);
+            let stated = bsdf.diffuse_albedo(wo) + bsdf.specular_albedo(wo) + bsdf.translucent_albedo(wo);
             let rough_glass = bsdf.layers.refracts() && !bsdf.is_delta();
-            let tolerance = if rough_glass { 0.04 } else { 0.015 };
+            let slack = slack(&shading);
+            let tolerance = if rough_glass { 0.04 } else { 0.02 } + slack;
             let difference = (sent - stated).map(f32::abs).max_channel();
-            assert!(difference < tolerance, "{shading:?} at {cos}: {sent:?}, stated {stated:?}");
+            worst = [worst[0].max(sent.max_channel()), worst[1].max(difference)];
+            if sent.max_channel() > 1.025 + 0.4 * slack || difference >= tolerance {
+                println!("{shading:?} at {cos}, front {front}: {sent:?}, stated {stated:?}");
+                worst[1] = 9.0;
+            }
+        }
+    }
+    // Table ±0.005, 4000 quasi-random samples ±0.005.
+    assert!(worst[1] < 1.0, "{worst:?}");
+}
+
+#[test]
+fn white_lobes_lose_no_more_than_stated_in_a_white_furnace() {
+    let white_sheen = Some(Sheen { color: Rgb::WHITE, roughness: 0.6 });
+    for (shading, bound) in [
+        (Shading { clearcoat: VARNISH, ..PLASTIC }, 0.01),
+        (Shading { clearcoat: DULL, ..WHITE_LAMBERT }, 0.01),
+        (Shading { clearcoat: VARNISH, roughness: 0.3, ..METAL }, 0.07),
+        (Shading { clearcoat: DULL, roughness: 0.8, ..METAL }, 0.07),
+        (Shading { sheen: white_sheen, ..WHITE_LAMBERT }, 0.01),
+        (Shading { sheen: white_sheen, ..PLASTIC }, 0.03),
+        (Shading { translucency: Some(Translucency { share: 0.4, color: Rgb::WHITE }), ..PLASTIC }, 0.01),
+        (Shading { film: SOAP, ..PLASTIC }, 0.06),
+        (Shading { film: SOAP, ..WINDOW }, 0.06),
+        (Shading { anisotropy: Some((0.6, Vec3::X)), roughness: 0.5, ..METAL }, 0.1),
+    ] {
+        for cos in [1.0, 0.7, 0.4, 0.2, 0.1] {
+            let sent = furnace(&bsdf(&shading, true), direction(cos), 8000);
+            println!("{shading:?} at {cos}: {sent:?}");
+            let error = (sent - Rgb::WHITE).map(f32::abs).max_channel();
+            assert!(error < bound, "{shading:?} at {cos}: {sent:?}");
         }
     }
 }
@@ -101,13 +177,33 @@ fn white_dielectrics_and_smooth_glass_vanish_in_a_white_furnace() {
 }
 
 #[test]
-fn rough_white_glass_loses_no_more_than_stated() {
-    // What single scattering loses, more on the way out than on the way in.
-    for (roughness, loss) in [(0.1, 0.01), (0.3, 0.05), (0.5, 0.2), (1.0, 0.57)] {
-        for (cos, front) in [(1.0, true), (0.4, true), (0.9, false), (0.4, false)] {
-            let glass = bsdf(&Shading { roughness, ..GLASS }, front).with_transport(Transport::Importance);
-            let sent = furnace(&glass, direction(cos), 4000).r;
-            assert!(sent < 1.005 && sent > 1.0 - loss, "roughness {roughness} at {cos}: {sent}");
+fn white_metal_vanishes_in_a_white_furnace() {
+    // Worst where narrow lobes are met aslant: the strengthening takes E for the same on both sides.
+    for i in 0..=20 {
+        let roughness = i as f32 / 20.0;
+        let metal = bsdf(&Shading { roughness, ..METAL }, true);
+        for (cos, bound) in [(1.0, 0.01), (0.8, 0.01), (0.6, 0.01), (0.4, 0.01), (0.2, 0.02), (0.1, 0.03)] {
+            let sent = furnace(&metal, direction(cos), 8000).r;
+            println!("roughness {roughness} at {cos}: {sent}");
+            assert!((sent - 1.0).abs() < bound, "metal of roughness {roughness} at {cos}: {sent}");
+        }
+    }
+}
+
+#[test]
+fn rough_white_glass_vanishes_in_a_white_furnace() {
+    for glass in [GLASS, WINDOW, Shading { ior: 1.2, ..GLASS }, Shading { ior: 2.4, ..GLASS }] {
+        for roughness in [0.1, 0.3, 0.5, 0.75, 1.0] {
+            for (cos, front) in [(1.0, true), (0.4, true), (0.15, true), (0.9, false), (0.4, false)] {
+                let bsdf = bsdf(&Shading { roughness, ..glass }, front).with_transport(Transport::Importance);
+                let sent = furnace(&bsdf, direction(cos), 8000).r;
+                println!("ior {} roughness {roughness} at {cos}, {front}: {sent}", glass.ior);
+                assert!(
+                    (sent - 1.0).abs() < 0.02,
+                    "ior {} roughness {roughness} at {cos}: {sent}",
+                    glass.ior
+                );
+            }
         }
     }
 }
@@ -180,7 +276,7 @@ fn a_weight_is_f_cos_over_pdf_and_importance_has_no_eta_squared() {
 #[test]
 fn samples_follow_their_density() {
     // 10⁵ samples over 24 × 48 cells of the sphere, cells of fewer than 8 expected pooled; z < 5.2: one false
-    // alarm in 10⁷ for each of the eighteen. A lobe wrong by 5 % in a tenth of the cells gives z > 6.
+    // alarm in 10⁷ for each of the 32. A lobe wrong by 5 % in a tenth of the cells gives z > 6.
     let cases = [
         (WHITE_LAMBERT, true),
         (Shading { roughness: 0.6, ..METAL }, true),
@@ -191,6 +287,13 @@ fn samples_follow_their_density() {
         (Shading { roughness: 0.6, ..GLASS }, false),
         (Shading { roughness: 0.8, ior: 1.2, ..GLASS }, false),
         (Shading { roughness: 0.7, transmission: 0.5, metallic: 0.3, ..GLASS }, true),
+        (Shading { roughness: 0.9, clearcoat: DULL, ..METAL }, true),
+        (Shading { roughness: 0.5, clearcoat: VARNISH, ..METAL }, true),
+        (Shading { sheen: VELVET, clearcoat: DULL, ..PLASTIC }, true),
+        (Shading { roughness: 0.6, film: SOAP, ..METAL }, true),
+        (Shading { translucency: PAPER, ..PLASTIC }, false),
+        (Shading { roughness: 0.6, anisotropy: Some((0.7, Vec3::new(1.0, 2.0, 0.0))), ..METAL }, true),
+        (Shading { roughness: 0.7, anisotropy: Some((0.7, Vec3::X)), ..GLASS }, true),
     ];
     for (k, (shading, front)) in cases.iter().enumerate() {
         for cos in [0.8, 0.25] {
@@ -211,8 +314,8 @@ fn chi_square(bsdf: &Bsdf, wo: Vec3, seed: u64) -> (f64, f64) {
     let mut rng = Rng::new(77, seed);
     let mut counts = vec![0.0f64; ROWS * COLUMNS];
     for _ in 0..n {
-        // Directions that carry nothing were drawn too, but the density leaves them out as well.
-        if let Some(s) = bsdf.sample(wo, rng.array()) {
+        // Directions that carry nothing were drawn too, and perfect ones, but the density leaves them out as well.
+        if let Some(s) = bsdf.sample(wo, rng.array()).filter(|s| !s.delta) {
             let row = ((0.5 - 0.5 * s.wi.z) * ROWS as f32) as usize;
             let column = ((s.wi.y.atan2(s.wi.x) / (2.0 * PI) + 0.5) * COLUMNS as f32) as usize;
             counts[row.min(ROWS - 1) * COLUMNS + column.min(COLUMNS - 1)] += 1.0;
@@ -296,13 +399,13 @@ fn a_slab_of_glass_reflects_and_transmits_the_series_of_all_orders() {
     // polarisation between the faces has 0.9073 and 0.6181; we do not follow it.
     for (degrees, transmitted) in [(0.0f32, 0.92307692), (45.0, 0.90432677), (75.0, 0.59609231)] {
         let wo = direction(degrees.to_radians().cos());
-        let [mirror, pass] = bsdf(&GLASS, true).delta_lobes(wo);
+        let [mirror, pass, _] = bsdf(&GLASS, true).delta_lobes(wo);
         let (mut r, mut t) = (mirror.unwrap().weight.r, 0.0);
         let (mut inside, mut weight) = (pass.unwrap().wi, pass.unwrap().weight.r);
         for bounce in 0..40 {
             // Seen from within, the face the ray now meets has its front away from us.
             let normal = if inside.z < 0.0 { Vec3::Z } else { -Vec3::Z };
-            let [mirror, pass] = Bsdf::new(&GLASS, normal, normal, false).delta_lobes(-inside);
+            let [mirror, pass, _] = Bsdf::new(&GLASS, normal, normal, false).delta_lobes(-inside);
             let out = pass.expect("no total reflection in a slab");
             assert!((out.wi.z.abs() - wo.z).abs() < 1e-5, "it leaves at the angle it came in");
             *(if bounce % 2 == 0 { &mut t } else { &mut r }) += weight * out.weight.r;
@@ -317,7 +420,7 @@ fn glass_without_a_step_of_index_is_not_there() {
     for roughness in [0.0, 0.5] {
         for (cos, front) in [(1.0, true), (0.01, true), (0.3, false)] {
             let bsdf = bsdf(&Shading { ior: 1.0, roughness, ..GLASS }, front);
-            let [mirror, pass] = bsdf.delta_lobes(direction(cos));
+            let [mirror, pass, _] = bsdf.delta_lobes(direction(cos));
             let pass = pass.unwrap();
             assert!(mirror.is_none() && pass.straight && pass.weight == Rgb::WHITE);
             assert_eq!(pass.wi, -direction(cos));

@@ -1,7 +1,6 @@
 //! Glossy transmission: the lobe mirrored through a thin wall, or refraction into a volume.
 
 use super::Transport;
-use super::ggx::Ggx;
 use super::layers::Layers;
 use super::reflection;
 use crate::Rgb;
@@ -15,7 +14,7 @@ use crate::math::Vec3;
 /// ```
 /// for radiance; importance has no η² (see [`Transport`]).
 pub fn eval(layers: &Layers, wo: Vec3, wi: Vec3, transport: Transport) -> Rgb {
-    let ggx = Ggx { alpha: layers.alpha() };
+    let ggx = layers.ggx;
     if !layers.refracts() {
         let mirrored = Vec3::new(wi.x, wi.y, -wi.z);
         let Some(h) = (wo + mirrored).try_normalize() else { return Rgb::BLACK };
@@ -31,10 +30,10 @@ pub fn eval(layers: &Layers, wo: Vec3, wi: Vec3, transport: Transport) -> Rgb {
 /// Density over wi, 1/sr, of sending `wo` through a visible microfacet, whatever the Fresnel term, and that facet.
 pub fn pdf(layers: &Layers, wo: Vec3, wi: Vec3) -> Option<(f32, Vec3)> {
     if !layers.refracts() {
-        return reflection::pdf(layers.alpha(), wo, Vec3::new(wi.x, wi.y, -wi.z));
+        return reflection::pdf(layers.ggx, wo, Vec3::new(wi.x, wi.y, -wi.z));
     }
     let (h, jacobian) = facet(layers.eta(), wo, wi)?;
-    Some((Ggx { alpha: layers.alpha() }.pdf_visible(wo, h) * jacobian, h))
+    Some((layers.ggx.pdf_visible(wo, h) * jacobian, h))
 }
 
 /// What radiance gains on its way from wi's medium to wo's; 1 for importance and for thin walls.

@@ -182,7 +182,7 @@ impl<'a> Sparse<'a> {
 }
 
 impl Format {
-    /// Bytes of one element. Matrices, which alone have padding, are not read by anybody here.
+    /// Bytes of one element. Of matrices, which may have padding, only those of floats are read, which have none.
     fn size(self) -> usize {
         self.width * self.component.size()
     }

@@ -19,10 +19,13 @@ pub(super) struct Layout {
 /// Appends `primitive`, transformed by `world`, as one part. Returns how many normals had to be replaced
 /// by that of a face, since they were zero or not finite.
 ///
-/// Positions may come out non-finite or triangles without area: `clean` judges the whole mesh at the end.
+/// Positions may come out non-finite or triangles without area: `clean` judges the whole mesh at the end. When the
+/// primitive `is_last`, not needed again, a mesh still empty takes its arrays as they are: of a scan that is all of
+/// one primitive, half of the memory.
 pub(super) fn append(
     mesh: &mut Mesh,
-    primitive: &Primitive,
+    primitive: &mut Primitive,
+    is_last: bool,
     world: &DAffine3,
     material: MaterialId,
     name: String,
@@ -32,16 +35,21 @@ pub(super) fn append(
     let m = world.matrix3;
     // A mirror turns triangles inside out: glTF 2.0, 3.7.4, turns them back.
     let sign = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
-    extend(&mut mesh.positions, &primitive.positions, |p| world.transform_point3(p.as_dvec3()).as_vec3());
+    let takes = is_last && base == 0;
+    let has_normals = !primitive.normals.is_empty();
+    put(&mut mesh.positions, &mut primitive.positions, takes, |p| {
+        world.transform_point3(p.as_dvec3()).as_vec3()
+    });
     let corner = |v: u32| v + base as u32;
     let first = mesh.triangles.len();
-    extend(&mut mesh.triangles, &primitive.triangles, |&[a, b, c]| {
+    let count = primitive.triangles.len() as u32;
+    put(&mut mesh.triangles, &mut primitive.triangles, takes, |&[a, b, c]| {
         if sign < 0.0 { [corner(a), corner(c), corner(b)] } else { [corner(a), corner(b), corner(c)] }
     });
     mesh.materials.resize(mesh.triangles.len(), material);
-    mesh.parts.push(Part { name, first: first as u32, count: primitive.triangles.len() as u32 });
+    mesh.parts.push(Part { name, first: first as u32, count });
 
-    let replaced = if primitive.normals.is_empty() {
+    let replaced = if !has_normals {
         mesh.normals.resize(mesh.positions.len(), Vec3::ZERO);
         replace_normals(mesh, base, first);
         0
@@ -49,7 +57,7 @@ pub(super) fn append(
         // Inverse transpose but for a positive factor; unlike that, it exists for a flattened mesh too.
         let cofactor = sign
             * DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
-        extend(&mut mesh.normals, &primitive.normals, |n| {
+        put(&mut mesh.normals, &mut primitive.normals, takes, |n| {
             let n = (cofactor * n.as_dvec3()).normalize_or_zero().as_vec3();
             if n.is_finite() { n } else { Vec3::ZERO }
         });
@@ -101,6 +109,16 @@ fn replace_normals(mesh: &mut Mesh, base: usize, first: usize) -> u64 {
     missing as u64
 }
 
+/// As [`extend`], or by `f` in place where `to` may take over the whole array.
+fn put<T: Send + Sync>(to: &mut Vec<T>, from: &mut Vec<T>, takes: bool, f: impl Fn(&T) -> T + Send + Sync) {
+    if takes {
+        *to = std::mem::take(from);
+        to.par_iter_mut().for_each(|v| *v = f(v));
+    } else {
+        extend(to, from, f);
+    }
+}
+
 /// `to.extend(from.map(f))`, on all threads where that pays.
 fn extend<S: Sync, T: Send>(to: &mut Vec<T>, from: &[S], f: impl Fn(&S) -> T + Send + Sync) {
     if from.len() < 1 << 14 {
@@ -127,10 +145,26 @@ mod tests {
         }
     }
 
+    fn copy(p: &Primitive) -> Primitive {
+        Primitive {
+            positions: p.positions.clone(),
+            normals: p.normals.clone(),
+            uvs: p.uvs.clone(),
+            colors: p.colors.clone(),
+            tangents: p.tangents.clone(),
+            triangles: p.triangles.clone(),
+        }
+    }
+
     fn bake(p: &Primitive, scale: DVec3) -> (Mesh, u64) {
         let mut mesh = Mesh::default();
         let layout = Layout { uvs: [true, false], colors: true, tangents: true };
-        let n = append(&mut mesh, p, &DAffine3::from_scale(scale), MaterialId(0), "x".into(), layout);
+        // In two copies; as the only one the primitive gives up its arrays, with the same result.
+        let at = DAffine3::from_scale(scale);
+        let n = append(&mut mesh, &mut copy(p), false, &at, MaterialId(0), "x".into(), layout);
+        let mut only = Mesh::default();
+        append(&mut only, &mut copy(p), true, &at, MaterialId(0), "x".into(), layout);
+        assert_eq!((&only.positions, &only.triangles), (&mesh.positions, &mesh.triangles));
         (mesh, n)
     }
 

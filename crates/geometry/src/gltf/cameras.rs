@@ -100,7 +100,7 @@ mod tests {
         let json = format!(r#""nodes":[{{"camera":0{node}}}],"cameras":[{camera}]"#);
         let document = Document::for_test(&json, Vec::new());
         let mut warnings = Warnings::default();
-        let placed = walk(&document, &mut Warnings::default())?;
+        let placed = walk(&document, None, &Default::default(), &mut Warnings::default())?;
         let camera = read(&document, &placed[0], &mut warnings)?;
         Ok((camera.into_iter().collect(), warnings.into_lines()))
     }
@@ -134,7 +134,7 @@ mod tests {
         assert!(cameras("", r#"{"type":"perspective","perspective":{"yfov":1e39,"znear":0.1}}"#).is_err());
         let json = r#""nodes":[{"camera":3}]"#;
         let document = Document::for_test(json, Vec::new());
-        let placed = walk(&document, &mut Warnings::default()).expect("a tree");
+        let placed = walk(&document, None, &Default::default(), &mut Warnings::default()).expect("a tree");
         let message =
             read(&document, &placed[0], &mut Warnings::default()).expect_err("no camera 3").to_string();
         assert!(message.contains("nodes[0].camera = 3"), "{message}");

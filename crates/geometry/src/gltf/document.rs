@@ -6,10 +6,12 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use gltf::json;
+use gltf::json::validation::USize64;
 
 use super::error::Error;
 use super::limits::Limits;
 use super::uri::{self, Target};
+use super::{draco, meshopt};
 
 /// The parsed JSON with the bytes that it refers to.
 pub(super) struct Document {
@@ -33,12 +35,18 @@ impl Document {
             Document { file: file.into(), root: json::Root::default(), limits, buffers: Vec::new(), read: 0 };
         let bytes = document.read_file(file)?;
         let container = |problem: String| Error::Container { file: file.into(), problem };
-        let (root, blob) = parse(&bytes).map_err(container)?;
-        drop(bytes);
+        let (root, blob) = parse(bytes).map_err(container)?;
         document.root = root;
         document.check_version()?;
         document.read_buffers(blob)?;
+        meshopt::decompress(&mut document)?;
+        draco::decompress(&mut document)?;
         Ok(document)
+    }
+
+    /// Lets go of all bytes, once everything has been decoded.
+    pub fn close(&mut self) {
+        self.buffers = Vec::new();
     }
 
     /// An [`Error::Value`] in this file.
@@ -64,28 +72,58 @@ impl Document {
         let view = self.root.buffer_views.get(i).ok_or_else(|| {
             self.fault(format_args!("{user}.bufferView"), i, "there is no buffer view of this number")
         })?;
-        let at = format_args!("bufferViews[{i}]");
-        let b = view.buffer.value();
-        let buffer = self.buffers.get(b).ok_or_else(|| {
-            self.fault(
-                format_args!("{at}.buffer"),
-                b,
-                format_args!("there is no buffer of this number ({user})"),
-            )
-        })?;
-        let buffer = buffer.as_deref().ok_or_else(|| {
-            self.fault(format_args!("buffers[{b}].uri"), "nothing", format_args!("needed by {user}"))
-        })?;
         let offset = view.byte_offset.unwrap_or_default().0;
-        let range = offset
-            .checked_add(view.byte_length.0)
-            .and_then(|end| Some(usize::try_from(offset).ok()?..usize::try_from(end).ok()?));
-        let bytes = range.and_then(|range| buffer.get(range)).ok_or_else(|| {
-            let value = format_args!("{offset} + {}", view.byte_length.0).to_string();
-            let problem = format!("ends beyond buffers[{b}], which has {} bytes ({user})", buffer.len());
-            self.fault(format_args!("{at}.byteOffset + byteLength"), value, problem)
-        })?;
+        let at = format_args!("bufferViews[{i}] ({user})").to_string();
+        let bytes = self.range(view.buffer.value() as u64, offset, view.byte_length.0, &at)?;
         Ok((bytes, view.byte_stride.map(|stride| stride.0)))
+    }
+
+    /// `length` bytes of a buffer from `offset` on, for what stands at the path `at`.
+    pub fn range(&self, buffer: u64, offset: u64, length: u64, at: &str) -> Result<&[u8], Error> {
+        let place = |member: &str| match at.split_once(' ') {
+            Some((path, user)) => format!("{path}.{member} {user}"),
+            None => format!("{at}.{member}"),
+        };
+        let bytes = usize::try_from(buffer)
+            .ok()
+            .and_then(|b| self.buffers.get(b))
+            .ok_or_else(|| self.fault(place("buffer"), buffer, "there is no buffer of this number"))?;
+        let bytes = bytes.as_deref().ok_or_else(|| {
+            self.fault(format_args!("buffers[{buffer}].uri"), "nothing", format_args!("needed by {at}"))
+        })?;
+        let range = offset
+            .checked_add(length)
+            .and_then(|end| Some(usize::try_from(offset).ok()?..usize::try_from(end).ok()?));
+        range.and_then(|range| bytes.get(range)).ok_or_else(|| {
+            let value = format_args!("{offset} + {length}").to_string();
+            let problem = format!("ends beyond buffers[{buffer}], which has {} bytes", bytes.len());
+            self.fault(place("byteOffset + byteLength"), value, problem)
+        })
+    }
+
+    /// A new buffer view over a new buffer of `bytes`, which count as if they had been read.
+    pub fn add_view(
+        &mut self,
+        at: &str,
+        bytes: Vec<u8>,
+        stride: Option<usize>,
+    ) -> Result<json::Index<json::buffer::View>, Error> {
+        let total = self.read.saturating_add(bytes.len() as u64);
+        self.within(at, "bytes to unpack in all", total, self.limits.bytes)?;
+        self.read = total;
+        let view = json::buffer::View {
+            buffer: json::Index::new(self.buffers.len() as u32),
+            byte_length: USize64(bytes.len() as u64),
+            byte_offset: None,
+            byte_stride: stride.map(json::buffer::Stride),
+            name: None,
+            target: None,
+            extensions: None,
+            extras: None,
+        };
+        self.buffers.push(Some(bytes));
+        self.root.buffer_views.push(view);
+        Ok(json::Index::new(self.root.buffer_views.len() as u32 - 1))
     }
 
     /// The bytes that `uri` leads to.
@@ -169,9 +207,11 @@ impl Document {
 }
 
 /// JSON and the binary chunk of a GLB, or the JSON alone.
-fn parse(bytes: &[u8]) -> Result<(json::Root, Option<Vec<u8>>), String> {
+///
+/// The chunk is what is left of `bytes`: a file of a gigabyte need not be held twice.
+fn parse(mut bytes: Vec<u8>) -> Result<(json::Root, Option<Vec<u8>>), String> {
     if !bytes.starts_with(b"glTF") {
-        return Ok((parse_json(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes))?, None));
+        return Ok((parse_json(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes))?, None));
     }
     // What follows the length stated in the header is to be ignored (glTF 2.0, 4.4.1), which the gltf crate
     // does not; where the file is shorter than stated, it says so.
@@ -179,11 +219,17 @@ fn parse(bytes: &[u8]) -> Result<(json::Root, Option<Vec<u8>>), String> {
     if length < 12 {
         return Err(format!("GLB: a stated length of {length} bytes"));
     }
-    let glb = gltf::Glb::from_slice(bytes.get(..length).unwrap_or(bytes)).map_err(|e| match e {
+    let glb = gltf::Glb::from_slice(bytes.get(..length).unwrap_or(&bytes)).map_err(|e| match e {
         gltf::Error::Binary(e) => format!("GLB: {e}"),
         e => e.to_string(),
     })?;
-    Ok((parse_json(&glb.json)?, glb.bin.map(|bin| bin.into_owned())))
+    let root = parse_json(&glb.json)?;
+    let bin = glb.bin.as_ref().map(|bin| (bin.as_ptr() as usize - bytes.as_ptr() as usize, bin.len()));
+    drop(glb);
+    let Some((start, length)) = bin else { return Ok((root, None)) };
+    bytes.truncate(start + length);
+    bytes.drain(..start);
+    Ok((root, Some(bytes)))
 }
 
 fn parse_json(text: &[u8]) -> Result<json::Root, String> {
@@ -240,14 +286,14 @@ mod tests {
         let json = br#"{"asset":{"version":"2.0"}} "#;
         let mut glb = b"glTF\x02\0\0\0\x30\0\0\0\x1c\0\0\0JSON".to_vec();
         glb.extend(json);
-        assert!(parse(&glb).is_ok());
-        assert!(parse(&[&glb[..], b"tail"].concat()).is_ok());
-        assert!(parse(&glb[..glb.len() - 1]).is_err());
+        assert!(parse(glb.clone()).is_ok());
+        assert!(parse([&glb[..], b"tail"].concat()).is_ok());
+        assert!(parse(glb[..glb.len() - 1].to_vec()).is_err());
         for length in 0..20 {
             // In whatever place it ends, and whatever length the header states.
-            assert!(parse(&glb[..length]).is_err());
+            assert!(parse(glb[..length].to_vec()).is_err());
             glb[8] = length as u8;
-            assert!(parse(&glb).is_err());
+            assert!(parse(glb.clone()).is_err());
         }
     }
 
@@ -260,8 +306,8 @@ mod tests {
             document.view(json::Index::new(i), &"test").map(|(b, _)| b.to_vec()).map_err(|e| e.to_string())
         };
         assert_eq!(view(0), Ok(vec![3, 4]));
-        assert!(view(1).is_err_and(|e| e.contains("bufferViews[1].byteOffset + byteLength = 0 + 5")));
-        assert!(view(2).is_err_and(|e| e.contains("bufferViews[2].buffer = 1")));
+        assert!(view(1).is_err_and(|e| e.contains("bufferViews[1].byteOffset + byteLength (test) = 0 + 5")));
+        assert!(view(2).is_err_and(|e| e.contains("bufferViews[2].buffer (test) = 1")));
         assert!(view(3).is_err() && view(4).is_err_and(|e| e.contains("test.bufferView = 4")));
     }
 }

@@ -47,6 +47,18 @@ pub enum Error {
         /// What is wrong with it.
         problem: String,
     },
+    /// Asked for by name, and not there.
+    #[error("{}: there is no {what} \"{asked}\"; the file has {}", file.display(), if known.is_empty() { "none" } else { known })]
+    NoSuch {
+        /// The glTF file.
+        file: PathBuf,
+        /// "scene" or "variant".
+        what: &'static str,
+        /// What was asked for.
+        asked: String,
+        /// Names of those there are.
+        known: String,
+    },
     /// More than [`Limits`](super::Limits) allow.
     #[error("{}: {at}: {value} {what}, more than the limit of {limit}", file.display())]
     Limit {

@@ -6,35 +6,33 @@ use super::error::Error;
 use super::warnings::Warnings;
 
 /// Modelled, wherever the file uses them.
-const MODELLED: [&str; 12] = [
+const MODELLED: [&str; 21] = [
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
     "EXT_texture_webp",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
-    "KHR_materials_emissive_strength",
-    "KHR_materials_ior",
-    "KHR_materials_specular",
-    "KHR_materials_transmission",
-    "KHR_materials_unlit",
-    "KHR_materials_volume",
-    "KHR_mesh_quantization",
-    "KHR_texture_transform",
-    // A file with variants shows its default materials.
-    "KHR_materials_variants",
-];
-
-/// Not modelled, but the file still shows the right shapes; where a material uses one, it says so there.
-const TOLERATED: [&str; 10] = [
-    "KHR_animation_pointer",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
     "KHR_materials_diffuse_transmission",
-    "KHR_materials_dispersion",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
     "KHR_materials_iridescence",
     "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_sheen",
-    "KHR_xmp",
-    "KHR_xmp_json_ld",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_variants",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
+    "KHR_texture_transform",
 ];
+
+/// Not modelled, but the file still shows the right shapes; where a material uses one, it says so there.
+const TOLERATED: [&str; 4] =
+    ["KHR_animation_pointer", "KHR_materials_dispersion", "KHR_xmp", "KHR_xmp_json_ld"];
 
 /// Refuses a file that requires what would make it come out wrong, and warns of the rest.
 pub(super) fn check(
@@ -69,12 +67,6 @@ pub(super) fn refusal(file: &Path, name: &str) -> Error {
 
 fn remedy(name: &str) -> &'static str {
     match name {
-        "KHR_draco_mesh_compression" => {
-            "export it again without Draco mesh compression (in Blender's glTF export: Data, Compression, off)"
-        }
-        "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
-            "export it again without meshopt compression (gltfpack: leave out -c and -cc)"
-        }
         "KHR_texture_basisu" => "export it again with PNG, JPEG or WebP textures instead of KTX2",
         "MSFT_texture_dds" => "export it again with PNG, JPEG or WebP textures instead of DDS",
         _ => {
@@ -94,9 +86,7 @@ mod tests {
 
     #[test]
     fn unknown_requirements_are_refused_by_name_with_a_remedy() {
-        for name in
-            ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_texture_basisu", "ACME_magic"]
-        {
+        for name in ["KHR_texture_basisu", "MSFT_texture_dds", "ACME_magic"] {
             let message = verdict(name).expect_err(name).to_string();
             assert!(message.contains(name) && message.contains("export"), "{message}");
         }

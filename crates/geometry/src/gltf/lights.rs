@@ -97,7 +97,7 @@ mod tests {
             "extensions":{{"KHR_lights_punctual":{{"light":0}}}}}}]"#
         );
         let document = Document::for_test(&json, Vec::new());
-        let placed = walk(&document, &mut Warnings::default()).expect("a tree");
+        let placed = walk(&document, None, &Default::default(), &mut Warnings::default()).expect("a tree");
         let mut warnings = Warnings::default();
         let light = read(&document, &placed[0], &mut warnings).expect("valid");
         (light, warnings.into_lines())

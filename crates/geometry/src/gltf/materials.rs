@@ -22,8 +22,8 @@ pub(super) fn read_all(document: &Document, warnings: &mut Warnings) -> Result<V
 }
 
 /// Every place where a material may refer to a texture.
-pub(super) fn texture_refs(m: &mut Material) -> [&mut Option<TextureRef>; 7] {
-    [
+pub(super) fn texture_refs(m: &mut Material) -> Vec<&mut Option<TextureRef>> {
+    let mut all = vec![
         &mut m.base_color_texture,
         &mut m.metallic_roughness_texture,
         &mut m.emissive_texture,
@@ -31,14 +31,38 @@ pub(super) fn texture_refs(m: &mut Material) -> [&mut Option<TextureRef>; 7] {
         &mut m.specular_texture,
         &mut m.specular_color_texture,
         &mut m.transmission_texture,
-    ]
+    ];
+    if let Some(c) = &mut m.clearcoat {
+        all.extend([&mut c.strength_texture, &mut c.roughness_texture, &mut c.normal_texture]);
+    }
+    if let Some(s) = &mut m.sheen {
+        all.extend([&mut s.color_texture, &mut s.roughness_texture]);
+    }
+    if let Some(a) = &mut m.anisotropy {
+        all.push(&mut a.texture);
+    }
+    if let Some(i) = &mut m.iridescence {
+        all.extend([&mut i.share_texture, &mut i.thickness_texture]);
+    }
+    if let Some(t) = &mut m.diffuse_transmission {
+        all.extend([&mut t.share_texture, &mut t.color_texture]);
+    }
+    all
 }
 
-struct Reader<'a> {
-    document: &'a Document,
-    warnings: &'a mut Warnings,
+/// The uv set along which the tangents of a material's meshes run; `None` where it needs none.
+pub(super) fn tangent_set(m: &Material) -> Option<u8> {
+    let coat = m.clearcoat.and_then(|c| c.normal_texture);
+    let brushed = m.anisotropy.map(|a| a.texture.map_or(0, |t| t.uv_set));
+    m.normal_texture.or(coat).map(|t| t.uv_set).or(brushed)
+}
+
+/// Reads one material.
+pub(super) struct Reader<'a> {
+    pub document: &'a Document,
+    pub warnings: &'a mut Warnings,
     /// Path of the material.
-    at: String,
+    pub at: String,
 }
 
 impl Reader<'_> {
@@ -116,6 +140,11 @@ impl Reader<'_> {
         if let Some(e) = &e.volume {
             m.volume = self.volume(e)?;
         }
+        self.lobes(m, &e.others)?;
+        if m.diffuse_transmission.is_some() && e.volume.is_some() && m.transmission == 0.0 {
+            let text = "materials shown as thin sheets: light scattered within their volume is not modelled";
+            self.warnings.count(text, format!("\"{}\"", m.name), 1);
+        }
         self.warn_of_others(&m.name, &e.others);
         Ok(())
     }
@@ -148,13 +177,17 @@ impl Reader<'_> {
         }
     }
 
-    fn texture(&mut self, at: &str, info: &Option<json::texture::Info>) -> Result<Option<TextureRef>, Error> {
+    pub(super) fn texture(
+        &mut self,
+        at: &str,
+        info: &Option<json::texture::Info>,
+    ) -> Result<Option<TextureRef>, Error> {
         let Some(info) = info else { return Ok(None) };
         let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
         self.reference(at, info.index, info.tex_coord, transform)
     }
 
-    fn reference(
+    pub(super) fn reference(
         &mut self,
         at: &str,
         index: json::Index<json::Texture>,
@@ -191,7 +224,7 @@ impl Reader<'_> {
     }
 
     /// Only normal textures need this: there the gltf crate leaves the extension as plain JSON.
-    fn parse_transform(
+    pub(super) fn parse_transform(
         &self,
         at: &str,
         value: &Value,
@@ -201,7 +234,7 @@ impl Reader<'_> {
     }
 
     /// `v`, clamped to [0, 1] with a warning.
-    fn unit(&mut self, at: &str, v: f32) -> Result<f32, Error> {
+    pub(super) fn unit(&mut self, at: &str, v: f32) -> Result<f32, Error> {
         let clamped = self.finite(at, v)?.clamp(0.0, 1.0);
         if clamped != v {
             self.clamped(at, v, clamped);
@@ -210,7 +243,7 @@ impl Reader<'_> {
     }
 
     /// `v`, raised to `low` with a warning.
-    fn at_least(&mut self, at: &str, v: f32, low: f32) -> Result<f32, Error> {
+    pub(super) fn at_least(&mut self, at: &str, v: f32, low: f32) -> Result<f32, Error> {
         let raised = self.finite(at, v)?.max(low);
         if raised != v {
             self.clamped(at, v, raised);
@@ -218,11 +251,11 @@ impl Reader<'_> {
         Ok(raised)
     }
 
-    fn color(&mut self, at: &str, [r, g, b]: [f32; 3]) -> Result<Rgb, Error> {
+    pub(super) fn color(&mut self, at: &str, [r, g, b]: [f32; 3]) -> Result<Rgb, Error> {
         Ok(Rgb::new(self.at_least(at, r, 0.0)?, self.at_least(at, g, 0.0)?, self.at_least(at, b, 0.0)?))
     }
 
-    fn finite(&self, at: &str, v: f32) -> Result<f32, Error> {
+    pub(super) fn finite(&self, at: &str, v: f32) -> Result<f32, Error> {
         if v.is_finite() { Ok(v) } else { Err(self.fault(at, v, "not a finite number")) }
     }
 
@@ -230,7 +263,12 @@ impl Reader<'_> {
         self.warnings.say(format!("{}.{at}: {v} is out of range and taken as {to}", self.at));
     }
 
-    fn fault(&self, at: &str, value: impl std::fmt::Display, problem: impl std::fmt::Display) -> Error {
+    pub(super) fn fault(
+        &self,
+        at: &str,
+        value: impl std::fmt::Display,
+        problem: impl std::fmt::Display,
+    ) -> Error {
         self.document.fault(format_args!("{}.{at}", self.at), value, problem)
     }
 }
@@ -264,6 +302,40 @@ mod tests {
     }
 
     #[test]
+    fn lobes_of_plain_json_reach_the_material() {
+        let json = r#"{"extensions":{
+            "KHR_materials_clearcoat":{"clearcoatFactor":1,"clearcoatRoughnessFactor":0.2,"clearcoatNormalTexture":{"index":0,"scale":0.5}},
+            "KHR_materials_sheen":{"sheenColorFactor":[1,0.5,0],"sheenRoughnessFactor":0.3},
+            "KHR_materials_anisotropy":{"anisotropyStrength":0.6,"anisotropyRotation":1.5},
+            "KHR_materials_iridescence":{"iridescenceFactor":1,"iridescenceThicknessMaximum":250},
+            "KHR_materials_diffuse_transmission":{"diffuseTransmissionFactor":0.4,"diffuseTransmissionTexture":{"index":0,"texCoord":1}}}}"#;
+        let (mut m, warnings) = material(json).expect("valid");
+        assert!(warnings.is_empty(), "{warnings:?}");
+        let coat = m.clearcoat.expect("varnished");
+        assert_eq!((coat.strength, coat.roughness, coat.normal_scale), (1.0, 0.2, 0.5));
+        assert_eq!(m.sheen.expect("fuzzy").color, Rgb::new(1.0, 0.5, 0.0));
+        assert_eq!(m.anisotropy.map(|a| (a.strength, a.rotation)), Some((0.6, 1.5)));
+        assert_eq!(m.iridescence.map(|f| (f.ior, f.thickness)), Some((1.3, [100.0, 250.0])));
+        assert_eq!(m.diffuse_transmission.map(|t| (t.share, t.color)), Some((0.4, Rgb::WHITE)));
+        assert_eq!((texture_refs(&mut m).into_iter().flatten().count(), tangent_set(&m)), (2, Some(0)));
+        // Without strength a lobe is not there, and nobody looks it up.
+        let none = r#"{"extensions":{"KHR_materials_clearcoat":{},"KHR_materials_sheen":{},"KHR_materials_iridescence":{}}}"#;
+        assert!(!material(none).expect("valid").0.has_lobes());
+        let wrong = r#"{"extensions":{"KHR_materials_sheen":{"sheenColorFactor":[1,"x",0]}}}"#;
+        assert!(material(wrong).is_err_and(|e| e.contains("KHR_materials_sheen.sheenColorFactor")));
+    }
+
+    #[test]
+    fn specular_glossiness_is_a_dielectric_of_any_f0() {
+        let json = r#"{"pbrMetallicRoughness":{"metallicFactor":1},"extensions":{"KHR_materials_pbrSpecularGlossiness":{
+            "diffuseFactor":[0.5,0.4,0.3,0.9],"specularFactor":[0.9,0.6,0.2],"glossinessFactor":0.7}}}"#;
+        let (m, _) = material(json).expect("valid");
+        assert_eq!((m.metallic, m.ior, m.alpha, m.glossiness), (0.0, 0.0, 0.9, None));
+        assert_eq!((m.base_color, m.specular_color), (Rgb::new(0.5, 0.4, 0.3), Rgb::new(0.9, 0.6, 0.2)));
+        assert!((m.roughness - 0.3).abs() < 1e-6);
+    }
+
+    #[test]
     fn factors_out_of_range_are_clamped_and_said() {
         let (m, warnings) =
             material(r#"{"pbrMetallicRoughness":{"roughnessFactor":-5,"baseColorFactor":[2,1,1,1]}}"#)
@@ -278,8 +350,8 @@ mod tests {
     #[test]
     fn what_is_not_modelled_is_named() {
         let (_, warnings) =
-            material(r#"{"name":"Car","extensions":{"KHR_materials_clearcoat":{}}}"#).expect("valid");
-        assert!(warnings[0].contains("\"Car\"") && warnings[0].contains("KHR_materials_clearcoat"));
+            material(r#"{"name":"Car","extensions":{"ACME_materials_rust":{}}}"#).expect("valid");
+        assert!(warnings[0].contains("\"Car\"") && warnings[0].contains("ACME_materials_rust"));
     }
 
     #[test]

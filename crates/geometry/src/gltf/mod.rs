@@ -5,22 +5,29 @@
 //! [`Loaded::warnings`], never silence.
 
 mod accessor;
+mod animation;
 mod bake;
 mod cameras;
 mod clean;
+mod deform;
 mod document;
+mod draco;
 mod error;
 mod extensions;
 mod instancing;
 mod lights;
 mod limits;
+mod lobes;
 mod materials;
+mod meshopt;
 mod nodes;
+mod options;
 mod primitive;
 mod tangents;
 mod textures;
 mod topology;
 mod uri;
+mod variants;
 mod warnings;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -33,8 +40,11 @@ use gltf::json::validation::Checked;
 
 pub use error::Error;
 pub use limits::Limits;
+pub use options::Options;
 
+use self::animation::Pose;
 use self::bake::Layout;
+use self::deform::Deform;
 use self::document::Document;
 use self::primitive::{Needs, Primitive};
 use self::warnings::Warnings;
@@ -75,36 +85,48 @@ pub struct Facts {
     pub instances: u64,
     /// Triangles in the scene before useless ones were dropped.
     pub triangles: u64,
+    /// Names of the scenes, where they have any.
+    pub scenes: Vec<Option<String>>,
+    /// Names of the variants of its materials.
+    pub variants: Vec<String>,
 }
 
-/// Loads a `.gltf` or `.glb` file with its buffers and images, within the default [`Limits`].
+/// Loads a `.gltf` or `.glb` file with its buffers and images: its default scene in its rest pose.
 pub fn load(path: &Path) -> Result<Loaded, Error> {
-    load_with(path, &Limits::default())
+    load_with(path, &Options::default())
 }
 
 /// Loads a `.gltf` or `.glb` file with its buffers and images.
 ///
 /// Only files below the folder of `path` are read. Errors are for what would make the picture wrong, like a
 /// missing buffer; a missing image is a warning.
-pub fn load_with(path: &Path, limits: &Limits) -> Result<Loaded, Error> {
+pub fn load_with(path: &Path, options: &Options) -> Result<Loaded, Error> {
     // We know of no input that panics, but parsers and decoders of other people are called in here.
-    catch_unwind(AssertUnwindSafe(|| import(path, limits))).unwrap_or_else(|payload| {
+    catch_unwind(AssertUnwindSafe(|| import(path, options))).unwrap_or_else(|payload| {
         let text = payload.downcast_ref::<String>().cloned();
         let text = text.or_else(|| payload.downcast_ref::<&str>().map(|s| s.to_string()));
         Err(Error::Defect { file: path.into(), problem: text.unwrap_or_else(|| "a panic".into()) })
     })
 }
 
-fn import(path: &Path, limits: &Limits) -> Result<Loaded, Error> {
-    let mut document = Document::open(path, *limits)?;
+fn import(path: &Path, options: &Options) -> Result<Loaded, Error> {
+    let mut document = Document::open(path, options.limits)?;
     let mut warnings = Warnings::default();
     let root = &document.root;
     extensions::check(path, &root.extensions_used, &root.extensions_required, &mut warnings)?;
     let mut scene = Scene { materials: materials::read_all(&document, &mut warnings)?, ..Scene::default() };
-    if !root.animations.is_empty() {
-        warnings.say("animations are not modelled: everything stands in its rest pose");
+    let pose = match options.time {
+        Some(time) => animation::pose(&document, time)?,
+        None => Pose::new(),
+    };
+    match (options.time, root.animations.len()) {
+        (None, 1..) => warnings.say("animated: everything stands in its rest pose (--time shows another)"),
+        (Some(_), 0) => warnings.say("there is no animation: --time changes nothing"),
+        (Some(_), 2..) => warnings.say("of several animations the first is shown"),
+        _ => {}
     }
-    let placed = nodes::walk(&document, &mut warnings)?;
+    let variant = options.variant.as_ref().map(|name| variants::find(&document, name)).transpose()?;
+    let placed = nodes::walk(&document, options.scene.as_deref(), &pose, &mut warnings)?;
     let mut cameras = Vec::new();
     for node in &placed {
         cameras.extend(cameras::read(&document, node, &mut warnings)?);
@@ -113,13 +135,15 @@ fn import(path: &Path, limits: &Limits) -> Result<Loaded, Error> {
     cameras::make_names_differ(&mut cameras);
     scene.textures = textures::load(&mut document, &mut scene.materials, &mut warnings)?;
 
-    let uses = uses_of_meshes(&document, &placed, &mut warnings)?;
-    let (instances, triangles) = build(&document, &uses, &mut scene, &mut warnings)?;
+    let uses = uses_of_meshes(&document, &placed, &pose)?;
+    let (instances, triangles) = build(&document, &uses, variant, &mut scene, &mut warnings)?;
+    document.close();
     clean::clean(&mut scene, &mut warnings);
     if scene.mesh.triangles.is_empty() {
         warnings.say("the scene has no triangles");
     }
-    let json::Root { asset, extensions_used, extensions_required, meshes, .. } = document.root;
+    let variants = variants::names(&document.root);
+    let json::Root { asset, scenes, extensions_used, extensions_required, meshes, .. } = document.root;
     let facts = Facts {
         version: asset.version,
         generator: asset.generator,
@@ -130,6 +154,8 @@ fn import(path: &Path, limits: &Limits) -> Result<Loaded, Error> {
         meshes: meshes.len(),
         instances,
         triangles,
+        scenes: scenes.into_iter().map(|s| s.name).collect(),
+        variants,
     };
     Ok(Loaded { scene, cameras, warnings: warnings.into_lines(), facts })
 }
@@ -139,17 +165,18 @@ fn import(path: &Path, limits: &Limits) -> Result<Loaded, Error> {
 struct Uses {
     /// Node and transform of each.
     places: Vec<(usize, DAffine3)>,
+    /// Those that bend the mesh, each in its own way.
+    bent: Vec<(usize, Vec<DAffine3>, Deform)>,
 }
 
 /// For each mesh of the file, where it stands in the scene.
-fn uses_of_meshes(
-    document: &Document,
-    placed: &[nodes::Placed],
-    warnings: &mut Warnings,
-) -> Result<Vec<Uses>, Error> {
+fn uses_of_meshes(document: &Document, placed: &[nodes::Placed], pose: &Pose) -> Result<Vec<Uses>, Error> {
     let root = &document.root;
     let mut uses: Vec<Uses> = root.meshes.iter().map(|_| Uses::default()).collect();
     let mut total = 0;
+    let mut worlds = vec![None; root.nodes.len()];
+    placed.iter().for_each(|place| worlds[place.node] = Some(place.world));
+    let world_of = |node: usize| worlds.get(node).copied().flatten();
     for place in placed {
         let node = &root.nodes[place.node];
         let Some(index) = node.mesh else { continue };
@@ -161,13 +188,6 @@ fn uses_of_meshes(
                 "there is no mesh of this number",
             ));
         };
-        let name = || nodes::name(root, place.node);
-        if node.skin.is_some() {
-            warnings.count("skins are not modelled: meshes stand in their bind pose", name(), 1);
-        }
-        if mesh.primitives.iter().any(|p| p.targets.as_ref().is_some_and(|t| !t.is_empty())) {
-            warnings.count("morph targets are not modelled: meshes keep their base shape", name(), 1);
-        }
         let transforms = instancing::transforms(document, place)?;
         total += transforms.len() as u64 * mesh.primitives.len() as u64;
         document.within(
@@ -176,7 +196,15 @@ fn uses_of_meshes(
             total,
             document.limits.instances,
         )?;
-        uses[m].places.extend(transforms.iter().map(|&t| (place.node, t)));
+        match Deform::of(document, place.node, pose, &world_of)? {
+            None => uses[m].places.extend(transforms.iter().map(|&t| (place.node, t))),
+            Some(bent) => {
+                // Joints lead to the world by themselves.
+                let skinned = bent.joints.is_some();
+                let transforms = if skinned { vec![DAffine3::IDENTITY] } else { transforms.into_owned() };
+                uses[m].bent.push((place.node, transforms, bent));
+            }
+        }
     }
     Ok(uses)
 }
@@ -186,16 +214,23 @@ fn uses_of_meshes(
 fn build(
     document: &Document,
     uses: &[Uses],
+    variant: Option<u64>,
     scene: &mut Scene,
     warnings: &mut Warnings,
 ) -> Result<(u64, u64), Error> {
     let root = &document.root;
-    let used = || root.meshes.iter().zip(uses).enumerate().filter(|(_, (_, u))| !u.places.is_empty());
+    let used = || {
+        root.meshes
+            .iter()
+            .zip(uses)
+            .enumerate()
+            .filter(|(_, (_, u))| !(u.places.is_empty() && u.bent.is_empty()))
+    };
     let uv_sets: Vec<[bool; 2]> = scene.materials.iter_mut().map(uv_sets).collect();
     let layout = Layout {
         uvs: [0, 1].map(|set| uv_sets.iter().any(|sets| sets[set])),
         colors: used().any(|(_, (mesh, _))| mesh.primitives.iter().any(has_colors)),
-        tangents: scene.materials.iter().any(|m| m.normal_texture.is_some()),
+        tangents: scene.materials.iter().any(|m| materials::tangent_set(m).is_some()),
     };
     // Corners must be countable in 32 bits.
     let limit = document.limits.triangles.min(u64::from(u32::MAX) / 3);
@@ -204,8 +239,8 @@ fn build(
     for (m, (mesh, uses)) in used() {
         for (p, json) in mesh.primitives.iter().enumerate() {
             let at = format!("meshes[{m}].primitives[{p}]");
-            instances += uses.places.len() as u64;
-            let material = match json.material.map(|i| i.value()) {
+            let own = json.material.map(|i| i.value());
+            let material = match variant.and_then(|v| variants::material(json, v)).or(own) {
                 Some(i) if i < root.materials.len() => MaterialId(i as u32),
                 Some(i) => {
                     return Err(document.fault(
@@ -219,22 +254,34 @@ fn build(
                     MaterialId((scene.materials.len() - 1) as u32)
                 }),
             };
-            let normal_map = scene.materials[material.0 as usize].normal_texture.map(|t| t.uv_set);
+            let tangents = materials::tangent_set(&scene.materials[material.0 as usize]);
             let uvs = uv_sets.get(material.0 as usize).copied().unwrap_or_default();
-            let needs = Needs { uvs, colors: layout.colors, normal_map };
-            let Some(primitive) = Primitive::read(document, json, &at, needs)? else {
-                warnings.count("points and lines are left out", &at, 1);
-                continue;
-            };
-            if [0, 1].into_iter().any(|set| uvs[set] && primitive.uvs[set].is_empty()) {
-                warnings.count("primitives lack a TEXCOORD that their textures need: taken as 0", &at, 1);
-            }
-            triangles += primitive.triangles.len() as u64 * uses.places.len() as u64;
-            document.within(&at, "triangles", triangles, limit)?;
-            for (node, world) in &uses.places {
-                let name = nodes::name(root, *node);
-                let replaced = bake::append(&mut scene.mesh, &primitive, world, material, name, layout);
-                warnings.count("normals replaced by that of a face: zero or not finite", &at, replaced);
+            let needs = Needs { uvs, colors: layout.colors, tangents };
+            let plain = (!uses.places.is_empty()).then_some((&uses.places[..], None));
+            let bent: Vec<(Vec<(usize, DAffine3)>, &Deform)> = uses
+                .bent
+                .iter()
+                .map(|(node, places, deform)| (places.iter().map(|&t| (*node, t)).collect(), deform))
+                .collect();
+            let bent = bent.iter().map(|(places, deform)| (&places[..], Some(*deform)));
+            for (places, deform) in plain.into_iter().chain(bent) {
+                instances += places.len() as u64;
+                let Some(mut primitive) = Primitive::read(document, json, &at, needs, deform)? else {
+                    warnings.count("points and lines are left out", &at, 1);
+                    break;
+                };
+                let textured = textured_sets(&mut scene.materials[material.0 as usize]);
+                if [0, 1].into_iter().any(|set| textured[set] && primitive.uvs[set].is_empty()) {
+                    warnings.count("primitives lack a TEXCOORD that their textures need: taken as 0", &at, 1);
+                }
+                triangles += primitive.triangles.len() as u64 * places.len() as u64;
+                document.within(&at, "triangles", triangles, limit)?;
+                for (k, (node, world)) in places.iter().enumerate() {
+                    let (name, last) = (nodes::name(root, *node), k + 1 == places.len());
+                    let mesh = &mut scene.mesh;
+                    let replaced = bake::append(mesh, &mut primitive, last, world, material, name, layout);
+                    warnings.count("normals replaced by that of a face: zero or not finite", &at, replaced);
+                }
             }
         }
     }
@@ -242,10 +289,19 @@ fn build(
 }
 
 /// Which uv sets the textures of a material use.
-fn uv_sets(material: &mut Material) -> [bool; 2] {
+fn textured_sets(material: &mut Material) -> [bool; 2] {
     let mut sets = [false; 2];
     for texture in materials::texture_refs(material).into_iter().flatten() {
         sets[usize::from(texture.uv_set.min(1))] = true;
+    }
+    sets
+}
+
+/// Those, and the one that its tangents run along.
+fn uv_sets(material: &mut Material) -> [bool; 2] {
+    let mut sets = textured_sets(material);
+    if let Some(set) = materials::tangent_set(material) {
+        sets[usize::from(set.min(1))] = true;
     }
     sets
 }

@@ -3,6 +3,7 @@
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf::json;
 
+use super::animation::Pose;
 use super::document::Document;
 use super::error::Error;
 use super::warnings::Warnings;
@@ -15,11 +16,16 @@ pub(super) struct Placed {
     pub world: DAffine3,
 }
 
-/// All nodes of the default scene, parents first.
-pub(super) fn walk(document: &Document, warnings: &mut Warnings) -> Result<Vec<Placed>, Error> {
+/// All nodes of the scene asked for, or of the default one, parents first.
+pub(super) fn walk(
+    document: &Document,
+    scene: Option<&str>,
+    pose: &Pose,
+    warnings: &mut Warnings,
+) -> Result<Vec<Placed>, Error> {
     let nodes = &document.root.nodes;
     let parents = parents(document)?;
-    let roots = roots(document, &parents, warnings)?;
+    let roots = roots(document, scene, &parents, warnings)?;
     let mut placed = Vec::new();
     // A stack, not recursion: depth is the file's choice.
     let mut stack: Vec<(usize, DAffine3, usize)> = Vec::new();
@@ -27,7 +33,7 @@ pub(super) fn walk(document: &Document, warnings: &mut Warnings) -> Result<Vec<P
     while let Some((i, parent, depth)) = stack.pop() {
         let limit = document.limits.node_depth as u64;
         document.within(format_args!("nodes[{i}]"), "generations of nodes", depth as u64, limit)?;
-        let world = parent * local(document, i, &nodes[i])?;
+        let world = parent * local(document, i, &nodes[i], pose)?;
         placed.push(Placed { node: i, world });
         let children = nodes[i].children.as_deref().unwrap_or_default();
         stack.extend(children.iter().rev().map(|child| (child.value(), world, depth + 1)));
@@ -76,11 +82,15 @@ fn parents(document: &Document) -> Result<Vec<Option<usize>>, Error> {
 /// The root nodes of the scene to show.
 fn roots(
     document: &Document,
+    asked: Option<&str>,
     parents: &[Option<usize>],
     warnings: &mut Warnings,
 ) -> Result<Vec<usize>, Error> {
     let root = &document.root;
-    let scene = root.scene.map_or(0, |scene| scene.value());
+    let scene = match asked {
+        Some(asked) => find(document, asked)?,
+        None => root.scene.map_or(0, |scene| scene.value()),
+    };
     let Some(chosen) = root.scenes.get(scene) else {
         if root.scene.is_some() {
             return Err(document.fault("scene", scene, "there is no scene of this number"));
@@ -90,7 +100,7 @@ fn roots(
         }
         return Ok((0..root.nodes.len()).filter(|&i| parents[i].is_none()).collect());
     };
-    if root.scene.is_none() && root.scenes.len() > 1 {
+    if asked.is_none() && root.scene.is_none() && root.scenes.len() > 1 {
         warnings.say(format!("no default scene among {}: the first is shown", root.scenes.len()));
     }
     let mut listed = vec![false; root.nodes.len()];
@@ -107,20 +117,39 @@ fn roots(
     Ok(chosen.nodes.iter().map(|node| node.value()).collect())
 }
 
+/// The number of the scene of that name, or of that number where none has the name.
+fn find(document: &Document, asked: &str) -> Result<usize, Error> {
+    let scenes = &document.root.scenes;
+    let named = scenes.iter().position(|s| s.name.as_deref() == Some(asked));
+    let numbered = asked.parse().ok().filter(|i| *i < scenes.len());
+    named.or(numbered).ok_or_else(|| Error::NoSuch {
+        file: document.file.clone(),
+        what: "scene",
+        asked: asked.into(),
+        known: scenes
+            .iter()
+            .enumerate()
+            .map(|(i, s)| s.name.as_ref().map_or(i.to_string(), |name| format!("{i} \"{name}\"")))
+            .collect::<Vec<_>>()
+            .join(", "),
+    })
+}
+
 /// The node's own transform: its matrix, or translation · rotation · scale.
-fn local(document: &Document, i: usize, node: &json::Node) -> Result<DAffine3, Error> {
+fn local(document: &Document, i: usize, node: &json::Node, pose: &Pose) -> Result<DAffine3, Error> {
     let check = |member: &str, values: &[f32]| match values.iter().find(|v| !v.is_finite()) {
         Some(v) => Err(document.fault(format_args!("nodes[{i}].{member}"), v, "not a finite number")),
         None => Ok(()),
     };
-    if let Some(matrix) = &node.matrix {
+    let moved = pose.get(&i);
+    if let (Some(matrix), None) = (&node.matrix, moved) {
         check("matrix", matrix)?;
         // glTF 2.0, 3.5.3: the fourth row is (0, 0, 0, 1).
         return Ok(DAffine3::from_mat4(DMat4::from_cols_array(&matrix.map(f64::from))));
     }
-    let translation = node.translation.unwrap_or([0.0; 3]);
-    let rotation = node.rotation.unwrap_or_default().0;
-    let scale = node.scale.unwrap_or([1.0; 3]);
+    let translation = moved.and_then(|m| m.translation).or(node.translation).unwrap_or([0.0; 3]);
+    let rotation = moved.and_then(|m| m.rotation).unwrap_or(node.rotation.unwrap_or_default().0);
+    let scale = moved.and_then(|m| m.scale).or(node.scale).unwrap_or([1.0; 3]);
     check("translation", &translation)?;
     check("rotation", &rotation)?;
     check("scale", &scale)?;
@@ -150,7 +179,8 @@ mod tests {
     use super::*;
 
     fn placed(json: &str) -> Result<Vec<Placed>, String> {
-        walk(&Document::for_test(json, Vec::new()), &mut Warnings::default()).map_err(|e| e.to_string())
+        walk(&Document::for_test(json, Vec::new()), None, &Pose::new(), &mut Warnings::default())
+            .map_err(|e| e.to_string())
     }
 
     #[test]

@@ -6,9 +6,9 @@ use gltf::json::mesh::Semantic;
 use gltf::json::validation::Checked;
 
 use super::accessor::Accessor;
+use super::deform::Deform;
 use super::document::Document;
 use super::error::Error;
-use super::extensions;
 use super::tangents;
 use super::topology;
 use crate::math::{Vec2, Vec3, Vec4};
@@ -20,8 +20,8 @@ pub(super) struct Needs {
     pub uvs: [bool; 2],
     /// Vertex colours.
     pub colors: bool,
-    /// The uv set of this primitive's normal map.
-    pub normal_map: Option<u8>,
+    /// The uv set along which tangents run, where the material needs any.
+    pub tangents: Option<u8>,
 }
 
 /// Triangles with their vertices, before any transform. Optional arrays are empty or as long as `positions`.
@@ -43,14 +43,14 @@ const QUANTIZED: [ComponentType; 5] =
     [ComponentType::F32, ComponentType::I8, ComponentType::U8, ComponentType::I16, ComponentType::U16];
 
 impl Primitive {
-    /// Decodes `primitive`, whose path is `at`; none for points and lines.
+    /// Decodes `primitive`, whose path is `at`, bent by `deform`; none for points and lines.
     pub fn read(
         document: &Document,
         primitive: &json::mesh::Primitive,
         at: &str,
         needs: Needs,
+        deform: Option<&Deform>,
     ) -> Result<Option<Primitive>, Error> {
-        refuse_compressed(document, primitive)?;
         let Some(positions) = attribute(document, primitive, at, Semantic::Positions, None)? else {
             return Err(document.fault(
                 format_args!("{at}.attributes.POSITION"),
@@ -88,16 +88,19 @@ impl Primitive {
         if let Some(accessor) = normals {
             out.normals = gather(&accessor, &source, Vec3::from_array);
         }
+        if let Some(deform) = deform {
+            deform.apply(document, primitive, at, &source, vertices, &mut out)?;
+        }
         if needs.colors
             && let Some(accessor) = optional(Semantic::Colors(0))?
         {
             let channel = |c: f32| if c.is_nan() { 1.0 } else { c.clamp(0.0, 1.0) };
             out.colors = gather(&accessor, &source, |c: [f32; 4]| Vec4::from_array(c.map(channel)));
         }
-        if let Some(set) = needs.normal_map {
+        if let Some(set) = needs.tangents {
             // Without normals, tangents of the file must be ignored (glTF 2.0, 3.7.2.1).
             match optional(Semantic::Tangents)? {
-                Some(accessor) if !out.normals.is_empty() => {
+                Some(accessor) if !out.normals.is_empty() && deform.is_none() => {
                     out.tangents = gather(&accessor, &source, Vec4::from_array);
                 }
                 _ => tangents::generate(&mut out, usize::from(set.min(1))),
@@ -124,19 +127,6 @@ impl Primitive {
         self.uvs.iter_mut().for_each(|set| push(set, v));
         (self.positions.len() - 1) as u32
     }
-}
-
-/// A file may call Draco optional and still have no data outside of it: the zeros that glTF then asks for
-/// would show nothing.
-fn refuse_compressed(document: &Document, primitive: &json::mesh::Primitive) -> Result<(), Error> {
-    let name = "KHR_draco_mesh_compression";
-    let compressed = primitive.extensions.as_ref().is_some_and(|e| e.others.contains_key(name));
-    let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
-    let accessor = positions.and_then(|i| document.root.accessors.get(i.value()));
-    if compressed && accessor.is_some_and(|a| a.buffer_view.is_none() && a.sparse.is_none()) {
-        return Err(extensions::refusal(&document.file, name));
-    }
-    Ok(())
 }
 
 fn gather<const N: usize, T>(accessor: &Accessor, source: &[u32], make: impl Fn([f32; N]) -> T) -> Vec<T> {
@@ -192,7 +182,7 @@ mod tests {
             "meshes":[{{"primitives":[{{"indices":1,"attributes":{{"POSITION":0{extra}}}}}]}}]"#
         );
         let document = Document::for_test(&json, bytes);
-        Primitive::read(&document, &document.root.meshes[0].primitives[0], "p", needs)
+        Primitive::read(&document, &document.root.meshes[0].primitives[0], "p", needs, None)
     }
 
     #[test]

@@ -5,22 +5,7 @@ use crate::math::{Vec2, Vec3};
 use crate::{AlphaMode, Hit, Material, Mesh, Ray, Rgb, Scene, Texture, TextureRef};
 
 /// The shading of an unlit material: it sends nothing on.
-pub(super) const NOTHING: Shading = Shading {
-    base_color: Rgb::BLACK,
-    metallic: 0.0,
-    roughness: 1.0,
-    ior: 1.5,
-    specular: 0.0,
-    specular_color: Rgb::WHITE,
-    transmission: 0.0,
-    solid: false,
-};
-
-/// The parameters of the shading model at barycentric (u, v) of a triangle. Nothing for an unlit material.
-pub fn shading_at(scene: &Scene, triangle: u32, u: f32, v: f32) -> Shading {
-    let point = Point::new(scene, triangle, u, v);
-    if point.material.unlit { NOTHING } else { point.shading(point.base_color().0) }
-}
+pub(super) const NOTHING: Shading = Shading { base_color: Rgb::BLACK, ..Shading::LAMBERT };
 
 /// Share of the light that meets the surface at all, [0, 1]: 1 opaque, 0 or 1 for a mask, alpha for a blend.
 pub fn coverage_at(scene: &Scene, hit: &Hit) -> f32 {
@@ -57,7 +42,7 @@ pub fn straight_through(scene: &Scene, ray: &Ray, hit: &Hit) -> Rgb {
     }
     let normals = point.normals(-ray.direction);
     let cos = -ray.direction.dot(normals.shading);
-    beside + Layers::new(&shading, normals.front).transmission(cos) * coverage
+    beside + Layers::new(&point.with_lobes(shading, &normals), normals.front).straight(cos) * coverage
 }
 
 /// A point of a triangle and its material.
@@ -132,7 +117,13 @@ impl<'a> Point<'a> {
             roughness *= texel[1];
             metallic *= texel[2];
         }
-        let tint = self.texture(&m.specular_color_texture).map_or(Rgb::WHITE, |(t, uv)| t.sample_srgb(uv).0);
+        let (mut tint, mut gloss) = (Rgb::WHITE, 1.0);
+        if let Some((texture, uv)) = self.texture(&m.specular_color_texture) {
+            (tint, gloss) = texture.sample_srgb(uv);
+        }
+        if let Some(glossiness) = m.glossiness {
+            roughness = 1.0 - glossiness * gloss;
+        }
         Shading {
             base_color,
             metallic,
@@ -142,6 +133,7 @@ impl<'a> Point<'a> {
             specular_color: m.specular_color * tint,
             transmission: m.transmission * linear(&m.transmission_texture, 0),
             solid: m.volume.is_some(),
+            ..Shading::LAMBERT
         }
     }
 

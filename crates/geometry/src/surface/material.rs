@@ -1,16 +1,33 @@
 //! What a material may do anywhere on its surface: asked once for a scene, so that nobody pays for what is not there.
 
-use crate::bsdf::SMOOTH_ROUGHNESS;
+use crate::bsdf::{SMOOTH_ROUGHNESS, is_wide};
 use crate::optics::f0_from_ior;
 use crate::{AlphaMode, Material, Volume};
 
 impl Material {
-    /// Whether any point of it may reflect diffusely.
+    /// Whether any point of it may reflect diffusely, or let light through diffusely.
     pub fn may_be_diffuse(&self) -> bool {
+        // What bounces between wide facets leaves a metal diffusely.
         let metal = self.metallic >= 1.0 && self.metallic_roughness_texture.is_none();
+        let narrow = metal && !is_wide(self.roughness * self.roughness);
         let glass = self.transmission >= 1.0 && self.transmission_texture.is_none();
-        let black = self.base_color.is_black() && self.specular == 0.0;
-        !(metal || glass || self.unlit || black)
+        let black = self.base_color.is_black() && self.specular == 0.0 && self.diffuse_transmission.is_none();
+        !(narrow || glass || self.unlit || black)
+    }
+
+    /// Whether it has any of the lobes that only few materials have.
+    pub fn has_lobes(&self) -> bool {
+        self.clearcoat.is_some()
+            || self.sheen.is_some()
+            || self.anisotropy.is_some()
+            || self.iridescence.is_some()
+            || self.diffuse_transmission.is_some()
+    }
+
+    /// The least roughness of its lobes, textures left out of account: what decides whether it can focus light.
+    pub fn sharpest_roughness(&self) -> f32 {
+        let base = self.glossiness.map_or(self.roughness, |g| 1.0 - g);
+        self.clearcoat.map_or(base, |c| c.roughness.min(base))
     }
 
     /// Whether some light may go straight on through it, so that a shadow ray must ask how much.
@@ -31,7 +48,9 @@ impl Material {
         }
         let coat = self.specular * (self.specular_color * f0_from_ior(self.ior)).max_channel().min(1.0);
         let metal = self.metallic * self.base_color.max_channel();
-        coat.max(metal).max(self.transmission * (1.0 - self.metallic)) > threshold
+        let clearcoat = self.clearcoat.map_or(0.0, |c| 0.04 * c.strength);
+        let film = self.iridescence.map_or(0.0, |f| f.share);
+        coat.max(metal).max(self.transmission * (1.0 - self.metallic)).max(clearcoat).max(film) > threshold
     }
 
     /// Whether somewhere it may transmit light.
@@ -43,7 +62,9 @@ impl Material {
 
     /// Whether somewhere its mirror or glass may be perfect.
     pub fn may_be_smooth(&self) -> bool {
-        self.roughness < SMOOTH_ROUGHNESS || self.metallic_roughness_texture.is_some()
+        self.roughness < SMOOTH_ROUGHNESS
+            || self.metallic_roughness_texture.is_some()
+            || self.glossiness.is_some()
     }
 
     /// What it encloses: its volume, if light can get in.

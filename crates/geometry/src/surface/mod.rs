@@ -1,12 +1,13 @@
 //! The material at one point: textures looked up, factors multiplied, normals turned toward the ray.
 
+mod lobes;
 mod lookup;
 mod material;
 mod normals;
 #[cfg(test)]
 mod tests;
 
-pub use lookup::{coverage_at, emission_at, shading_at, straight_through};
+pub use lookup::{coverage_at, emission_at, straight_through};
 
 use crate::bsdf::Bsdf;
 use crate::math::Vec3;
@@ -53,7 +54,10 @@ impl Surface {
         let material = point.material;
         let normals = point.normals(-ray.direction);
         let (base_color, alpha) = point.base_color();
-        let shading = if material.unlit { lookup::NOTHING } else { point.shading(base_color) };
+        let shading = match material.unlit {
+            true => lookup::NOTHING,
+            false => point.with_lobes(point.shading(base_color), &normals),
+        };
         Surface {
             position: point.position(),
             triangle: hit.triangle,
@@ -70,6 +74,19 @@ impl Surface {
             bsdf: Bsdf::new(&shading, normals.shading, normals.geometric, normals.front),
             volume: material.enclosed(),
         }
+    }
+
+    /// The other side of a translucent surface, seen by the light there that comes through diffusely; `None` where none
+    /// does. It shines to the opposite of the viewer's direction, and has no lobe but the diffuse one.
+    pub fn turned(&self) -> Option<Surface> {
+        self.bsdf.is_translucent().then(|| Surface {
+            front: !self.front,
+            ng: -self.ng,
+            ns: -self.ns,
+            smooth: -self.smooth,
+            bsdf: self.bsdf.turned(),
+            ..self.clone()
+        })
     }
 
     /// What the ray travelled through on its way here, as far as this surface tells: its volume when the ray met

@@ -1,6 +1,7 @@
 //! Geometric, smooth and shading normal of a point, all turned toward the viewer.
 
 use super::lookup::Point;
+use crate::TextureRef;
 use crate::math::Vec3;
 
 /// Smallest cosine kept between the shading normal and both the viewer and the geometric normal.
@@ -28,7 +29,7 @@ impl Point<'_> {
         let front = geometric.dot(wo) >= 0.0;
         let side = if front { 1.0 } else { -1.0 };
         let smooth = self.smooth(geometric);
-        let mapped = self.mapped(smooth);
+        let mapped = self.mapped(smooth, &self.material.normal_texture, self.material.normal_scale);
         let geometric = geometric * side;
         let shading = lift(lift(mapped * side, geometric), wo);
         Normals { front, geometric, smooth: smooth * side, shading }
@@ -45,25 +46,29 @@ impl Point<'_> {
         if n.dot(geometric) < 0.0 { -n } else { n }
     }
 
-    /// With the normal map (glTF 2.0, 3.9.3): the texel's x along the tangent, y along the bitangent.
-    fn mapped(&self, n: Vec3) -> Vec3 {
-        let Some((texture, uv)) = self.texture(&self.material.normal_texture) else { return n };
+    /// `n` by a normal map (glTF 2.0, 3.9.3): the texel's x along the tangent, y along the bitangent.
+    pub fn mapped(&self, n: Vec3, map: &Option<TextureRef>, scale: f32) -> Vec3 {
+        let Some((texture, uv)) = self.texture(map) else { return n };
+        let Some((t, b)) = self.tangent_frame(n) else { return n };
+        let [x, y, z, _] = texture.sample_linear(uv).map(|c| 2.0 * c - 1.0);
+        (t * (x * scale) + b * (y * scale) + n * z.max(0.0)).try_normalize().unwrap_or(n)
+    }
+
+    /// Tangent and bitangent, unit, about the unit normal `n` on the triangle's front; `None` where there are none.
+    pub fn tangent_frame(&self, n: Vec3) -> Option<(Vec3, Vec3)> {
         if self.mesh().tangents.is_empty() {
-            return n;
+            return None;
         }
         let tangent = self.mesh().interpolate(self.triangle, self.u, self.v, &self.mesh().tangents);
         // Interpolation leaves the tangent neither unit nor square to the normal.
         let t = tangent.truncate();
-        let Some(t) = (t - n * n.dot(t)).try_normalize() else { return n };
-        let b = n.cross(t) * 1f32.copysign(tangent.w);
-        let [x, y, z, _] = texture.sample_linear(uv).map(|c| 2.0 * c - 1.0);
-        let scale = self.material.normal_scale;
-        (t * (x * scale) + b * (y * scale) + n * z.max(0.0)).try_normalize().unwrap_or(n)
+        let t = (t - n * n.dot(t)).try_normalize()?;
+        Some((t, n.cross(t) * 1f32.copysign(tangent.w)))
     }
 }
 
 /// `n` turned just enough toward the unit vector `to` that their cosine is at least [`MIN_COS`].
-fn lift(n: Vec3, to: Vec3) -> Vec3 {
+pub(super) fn lift(n: Vec3, to: Vec3) -> Vec3 {
     let cos = n.dot(to);
     if cos >= MIN_COS {
         return n;

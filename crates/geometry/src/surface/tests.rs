@@ -1,6 +1,7 @@
 //! Surfaces of a single triangle.
 
 use super::*;
+use crate::bsdf::Shading;
 use crate::math::{Affine2, Vec2, Vec4};
 use crate::texture::{Texture, Wrap};
 use crate::{AlphaMode, Material, Mesh, Part, TextureRef};
@@ -190,4 +191,9 @@ fn a_normal_map_leans_along_the_tangent_on_either_side() {
     assert!((surface(&scene, Vec3::Z).ns + front.ns).length() < 1e-6);
     scene.materials[0].normal_scale = 0.0;
     assert!((surface(&scene, Vec3::NEG_Z).ns - Vec3::Z).length() < 1e-6);
+}
+
+fn shading_at(scene: &Scene, triangle: u32, u: f32, v: f32) -> Shading {
+    let point = Point::new(scene, triangle, u, v);
+    point.shading(point.base_color().0)
 }

@@ -101,6 +101,27 @@ impl Hybrid<'_> {
         places: &[Vec3],
         rng: &mut Rng,
     ) -> (Diffuse, Plan) {
+        let (mut out, plan) = self.diffuse_of_side(surface, wo, quality, phase, places, rng);
+        if let Some(turned) = surface.turned() {
+            let (through, _) = self.diffuse_of_side(&turned, -wo, quality, phase, places, rng);
+            out.direct += through.direct;
+            out.indirect += through.indirect;
+            out.variance += through.variance;
+            out.gather_variance += through.gather_variance;
+        }
+        (out, plan)
+    }
+
+    /// The same without what comes through from the other side.
+    fn diffuse_of_side(
+        &self,
+        surface: &Surface,
+        wo: Vec3,
+        quality: Quality,
+        phase: u32,
+        places: &[Vec3],
+        rng: &mut Rng,
+    ) -> (Diffuse, Plan) {
         let plan = Plan::new(self.world, surface.position, surface.ns, quality.shadow);
         let gloss = gloss_of(surface, wo);
         let has_diffuse = surface.bsdf.has_diffuse();
@@ -216,7 +237,7 @@ impl Hybrid<'_> {
             let followed = gather::follow(self.world, ray, rng, |hit, side, weight| {
                 let e = self.solution.irradiance(self.world, hit.triangle, hit.u, hit.v, side)
                     + self.solution.caustic(self.world, hit.triangle, hit.u, hit.v, side);
-                reflected = weight * e;
+                reflected += weight * e;
             });
             let brought = followed.direct + reflected;
             sum += brought;

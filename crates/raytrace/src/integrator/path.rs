@@ -278,27 +278,34 @@ impl<'a> Path<'a> {
             [u[0], u[1]] = first;
         }
         let sample = bsdf.sample(wo, u);
-        // A rough pane is lit from both sides.
+        // A rough pane is lit from both sides, and so is what light comes through diffusely.
         let rough = !bsdf.is_delta();
-        let preference =
-            if rough && !bsdf.layers.transmission(1.0).is_black() { Vec3::ZERO } else { surface.ns };
+        let preference = if (rough && !bsdf.layers.transmission(1.0).is_black()) || bsdf.is_translucent() {
+            Vec3::ZERO
+        } else {
+            surface.ns
+        };
         let goes_straight = sample.is_some_and(|s| s.straight);
         if !goes_straight {
             self.look(surface, t);
         }
         // Drawn whether the path goes straight on or not: the lobes that scatter are lit by every path alike.
-        if self.light_sampling && (rough || bsdf.has_diffuse()) {
+        if self.light_sampling && (rough || bsdf.has_diffuse() || bsdf.is_translucent()) {
             self.next_event(surface, wo, preference, rng);
         }
         if let Some(caustics) = self.caustics
-            && bsdf.has_diffuse()
+            && (bsdf.has_diffuse() || bsdf.is_translucent())
         {
             // A look-up takes as long as a path: a few of them do.
             let chance = if self.bounces == 0 { 0.25 } else { 0.125 };
             if rng.f32() < chance {
-                let e = caustics.irradiance(surface.position, surface.ng) / chance;
-                self.layers.indirect +=
-                    self.throughput * photometry::reflected_radiance(bsdf.diffuse_albedo(wo), e);
+                let by = |albedo: Rgb, n: Vec3| match albedo.is_black() {
+                    true => Rgb::BLACK,
+                    false => photometry::reflected_radiance(albedo, caustics.irradiance(surface.position, n)),
+                };
+                let sent =
+                    by(bsdf.diffuse_albedo(wo), surface.ng) + by(bsdf.translucent_albedo(wo), -surface.ng);
+                self.layers.indirect += self.throughput * sent / chance;
             }
         }
         let s = sample?;

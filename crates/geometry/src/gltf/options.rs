@@ -1,0 +1,16 @@
+//! What of a file to show.
+
+use super::limits::Limits;
+
+/// Which of the things that a file offers are loaded, and how much of them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Options {
+    /// Name or number of the scene; the file's own choice if absent.
+    pub scene: Option<String>,
+    /// Name of the materials' variant (KHR_materials_variants); the file's default if absent.
+    pub variant: Option<String>,
+    /// Time in the first animation, s; the rest pose if absent.
+    pub time: Option<f32>,
+    /// Bounds on what the file may ask for.
+    pub limits: Limits,
+}
