@@ -29,6 +29,7 @@ mod clusters;
 pub mod element;
 pub mod field;
 pub mod flags;
+pub mod form_factor;
 pub mod gather;
 pub mod importance;
 pub mod reach;

@@ -1,0 +1,2 @@
+//! Form factors.
+pub mod analytic;
