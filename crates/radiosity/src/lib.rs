@@ -25,6 +25,7 @@
 //! ```
 
 pub mod caustic;
+pub mod classical;
 mod clusters;
 pub mod element;
 pub mod field;
@@ -32,6 +33,8 @@ pub mod flags;
 pub mod form_factor;
 pub mod gather;
 pub mod importance;
+pub mod patch_to_vertex;
+pub mod patches;
 pub mod reach;
 pub mod refine;
 mod sites;
