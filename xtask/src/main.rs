@@ -9,6 +9,7 @@ mod comparison;
 mod ourselves;
 mod peers;
 mod scenes;
+mod stability;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
@@ -52,6 +53,8 @@ enum Chore {
         #[arg(long)]
         check: bool,
     },
+    /// Measure where each method fails, and write it down in assets/stability.md
+    Stability,
 }
 
 #[derive(Subcommand)]
@@ -75,6 +78,7 @@ fn main() -> Result<()> {
         Chore::Peers { what: None } => peers::list(),
         Chore::Peers { what: Some(Peers::Install) } => peers::install(),
         Chore::Scenes { check: false } => scenes::write(&root().join("assets")),
+        Chore::Stability => stability::run(),
         Chore::Scenes { check: true } => scenes::check(&root().join("assets")),
     }
 }

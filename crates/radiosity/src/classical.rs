@@ -10,8 +10,9 @@
 
 use crate::caustic::Caustics;
 use crate::form_factor::FormFactors;
+use crate::form_factor::emitted::Emitted;
 use crate::form_factor::hemicube::Hemicube;
-use crate::form_factor::matrix::{Emitted, Matrix};
+use crate::form_factor::matrix::Matrix;
 use crate::patch_to_vertex::{Fit, fit};
 use crate::patches::Patches;
 use crate::solution::{Report, Solution};
@@ -241,8 +242,9 @@ fn solve_matrix(room: &Room, config: &Config, progress: &dyn Progress) -> Result
         return Err(Error::TooLarge { patches: patches.len(), bytes, most: config.most_bytes });
     }
     progress.stage("form factors", patches.len() as u64);
-    let (mut matrix, Emitted { direct, by_gloss }) =
+    let mut matrix =
         Matrix::fill(room.world, patches, &config.form_factors, config.seed, || progress.advance(1));
+    let Emitted { direct, by_gloss } = Emitted::shoot(room.world, patches, &config.form_factors, config.seed);
     if config.enforce {
         matrix.enforce();
     }
@@ -273,7 +275,7 @@ fn solve_matrix(room: &Room, config: &Config, progress: &dyn Progress) -> Result
         norm,
         mean: room.mean(&e),
         balance: if left > 0.0 { came / left } else { 1.0 },
-        landings: patches.len() * patches.len(),
+        landings: patches.len(),
         row_bytes: bytes as usize,
         ..Report::default()
     };

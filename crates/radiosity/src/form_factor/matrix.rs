@@ -1,12 +1,11 @@
 //! All form factors of a scene at once.
 
 use super::FormFactors;
-use super::arrival::Way;
 use crate::patches::Patches;
 use geometry::{Rgb, World};
 use rayon::prelude::*;
 
-/// F for all pairs of patches, dense, and what the emission of patches brings, which need not be kept by pairs.
+/// F for all pairs of patches, dense.
 #[derive(Clone, Debug)]
 pub struct Matrix {
     n: usize,
@@ -24,15 +23,6 @@ pub struct Closure {
     pub sums: [f32; 2],
     /// Σ |A_i F_ij − A_j F_ji| over Σ (A_i F_ij + A_j F_ji): 0 when reciprocal, 1 when nothing is.
     pub reciprocity: f64,
-}
-
-/// Irradiance that the emission of patches brings to each patch, lx.
-#[derive(Clone, Debug, Default)]
-pub struct Emitted {
-    /// Straight.
-    pub direct: Vec<Rgb>,
-    /// By way of one rough surface.
-    pub by_gloss: Vec<Rgb>,
 }
 
 impl Matrix {
@@ -54,36 +44,24 @@ impl Matrix {
         how: &FormFactors,
         seed: u64,
         advance: impl Fn() + Sync,
-    ) -> (Matrix, Emitted) {
+    ) -> Matrix {
         let (n, channels) = (patches.len(), Matrix::channels(world));
         let mut shares = vec![0f32; n * n * channels];
-        let rows = shares.par_chunks_mut((n * channels).max(1)).enumerate();
-        let emitted: Vec<(Rgb, Rgb)> = rows
-            .map(|(i, row)| {
-                let (mut direct, mut by_gloss) = (Rgb::BLACK, Rgb::BLACK);
-                for a in how.row(world, patches, i as u32, seed, i as u64) {
-                    let j = a.patch as usize;
-                    let brought = a.share * patches.all[j].exitance;
-                    match a.way {
-                        Way::Straight => direct += brought,
-                        Way::Rough => by_gloss += brought,
-                        Way::Specular => {}
-                    }
-                    if channels == 1 {
-                        row[j] += a.share.g;
-                    } else {
-                        for c in 0..3 {
-                            row[c * n + j] += a.share[c];
-                        }
+        shares.par_chunks_mut((n * channels).max(1)).enumerate().for_each(|(i, row)| {
+            for a in how.row(world, patches, i as u32, seed, i as u64) {
+                let j = a.patch as usize;
+                if channels == 1 {
+                    row[j] += a.share.g;
+                } else {
+                    for c in 0..3 {
+                        row[c * n + j] += a.share[c];
                     }
                 }
-                advance();
-                (direct, by_gloss)
-            })
-            .collect();
-        let (direct, by_gloss) = emitted.into_iter().unzip();
+            }
+            advance();
+        });
         let areas = patches.all.iter().map(|p| p.area).collect();
-        (Matrix { n, channels, shares, areas }, Emitted { direct, by_gloss })
+        Matrix { n, channels, shares, areas }
     }
 
     /// From form factors known beforehand, one channel: `f(i, j)`.

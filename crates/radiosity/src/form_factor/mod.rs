@@ -11,6 +11,7 @@
 
 pub mod analytic;
 pub mod arrival;
+pub mod emitted;
 pub mod hemicube;
 pub mod matrix;
 pub mod ray_cast;
