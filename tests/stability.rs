@@ -1,6 +1,10 @@
 //! The torture cases: what has to pass passes, and what has to fail, as theory says, fails.
 
-use support::stability::{ELSEWHERE, Section, form_factors, hemicube_errors, solvers};
+use geometry::World;
+use radiosity::classical::Room;
+use radiosity::element::Side;
+use support::files::asset;
+use support::stability::{ELSEWHERE, Section, Solver, form_factors, hemicube_errors, solvers};
 
 fn comes_out(section: &Section) {
     println!("{}", section.markdown());
@@ -27,6 +31,23 @@ fn a_hemicube_is_as_wrong_as_its_pixels_are_large() {
     let slope = |a: (u32, f64), b: (u32, f64)| (a.1 / b.1).ln() / f64::from(b.0 / a.0).ln();
     let whole = slope(errors[0], errors[errors.len() - 1]);
     assert!((0.7..2.0).contains(&whole), "falls with the power {whole}: {errors:?}");
+}
+
+/// What light cannot reach (the outside of a room, the inside of a block) is no patch, or memory would go to the dark.
+#[test]
+fn patches_are_where_light_comes() {
+    let (scene, _) = asset("cornell-box.gltf");
+    let world = World::new(scene);
+    let settings = Solver::Progressive.settings(1, 1000);
+    let config = settings.classical.expect("it is a classical one");
+    let room = Room::new(&world, &config, &());
+    let mut shooting = room.shooting(&config);
+    shooting.shoot_until(u64::MAX, |s| s.finished(0.01));
+    let dark =
+        (0..room.patches.len()).filter(|&i| (shooting.direct[i] + shooting.indirect[i]).is_black()).count();
+    let backs = room.patches.all.iter().filter(|p| p.side == Side::Back).count();
+    println!("{} patches, {backs} of them backs, {dark} dark", room.patches.len());
+    assert!(dark * 20 < room.patches.len(), "{dark} of {}", room.patches.len());
 }
 
 #[test]

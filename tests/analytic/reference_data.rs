@@ -100,7 +100,7 @@ fn view_factors_are_those_of_the_catalogue() {
                     .world();
                 let patches = Patches::new(&world, 6, 0);
                 let of = |i: u32| {
-                    let all = estimate(&world, &patches, i, 4096, 64, u64::from(i));
+                    let all = estimate(&world, &patches, i, 16_384, 64, u64::from(i));
                     let to = patches.all.iter().zip(&all).filter(|(p, _)| (2..4).contains(&p.triangle));
                     to.fold((0.0, 0.0), |(f, s), (_, e)| (f + e.form_factor, s + e.variance))
                 };

@@ -32,7 +32,7 @@ fn markdown(sections: &[Section], errors: &[(u32, f64)]) -> String {
     for section in sections {
         text += &section.markdown();
     }
-    text += "\n## The hemicube's error\n\nA lamp of a tenth of its distance, at 24 places, root mean square. It falls as \
+    text += "\n## The hemicube's error\n\nA lamp of a tenth of its distance, at 24 places, root mean square. It falls about as \
              one over the resolution, as pixels at its edges are counted whole or not at all.\n\n![Hemicube's error](charts/hemicube.svg)\n\n| pixels | error |\n|---|---|\n";
     for (n, error) in errors {
         let _ = writeln!(text, "| {n} | {:.2} % |", 100.0 * error);
@@ -49,8 +49,8 @@ fn chart(errors: &[(u32, f64)]) -> String {
     let (w, h, left, top) = (480.0, 300.0, 60.0, 20.0);
     let (inner_w, inner_h) = (w - left - 20.0, h - top - 50.0);
     let x = |n: f64| left + inner_w * (n / 8.0).log2() / 6.0;
-    // From 100 % down to 0.1 %.
-    let y = |e: f64| top - inner_h * e.log10() / 3.0;
+    // From 1000 % down to 0.1 %.
+    let y = |e: f64| top + inner_h * (1.0 - e.log10()) / 4.0;
     let path = |points: &[(f64, f64)]| {
         points.iter().map(|&(n, e)| format!("{:.1},{:.1}", x(n), y(e))).collect::<Vec<_>>().join(" ")
     };
@@ -58,7 +58,7 @@ fn chart(errors: &[(u32, f64)]) -> String {
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {w} {h}\" font-family=\"sans-serif\" font-size=\"12\">\n\
          <title>Error of a hemicube's form factor against its resolution</title>\n<rect width=\"{w}\" height=\"{h}\" fill=\"#fff\"/>\n"
     );
-    for (e, label) in [(1.0, "100 %"), (0.1, "10 %"), (0.01, "1 %"), (0.001, "0.1 %")] {
+    for (e, label) in [(10.0, "1000 %"), (1.0, "100 %"), (0.1, "10 %"), (0.01, "1 %"), (0.001, "0.1 %")] {
         let _ = writeln!(
             svg,
             "<line x1=\"{left}\" x2=\"{0:.1}\" y1=\"{1:.1}\" y2=\"{1:.1}\" stroke=\"#ddd\"/>",
@@ -80,7 +80,7 @@ fn chart(errors: &[(u32, f64)]) -> String {
             h - 34.0
         );
     }
-    let points: Vec<(f64, f64)> = errors.iter().map(|&(n, e)| (f64::from(n), e.clamp(1e-3, 1.0))).collect();
+    let points: Vec<(f64, f64)> = errors.iter().map(|&(n, e)| (f64::from(n), e.clamp(1e-3, 10.0))).collect();
     let first = points.first().copied().unwrap_or((8.0, 1.0));
     let ideal: Vec<(f64, f64)> =
         points.iter().map(|&(n, _)| (n, (first.1 * first.0 / n).max(1e-3))).collect();
