@@ -2,4 +2,5 @@
 
 mod enclosures;
 mod optics;
+mod reference_data;
 mod shadows;

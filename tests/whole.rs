@@ -3,4 +3,6 @@
 mod agreement;
 mod analytic;
 mod property;
+mod random_rooms;
+mod stability;
 mod statistical;

@@ -5,4 +5,5 @@ pub mod build;
 pub mod files;
 pub mod picture;
 pub mod solved;
+pub mod stability;
 pub mod stuff;

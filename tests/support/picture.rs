@@ -13,6 +13,7 @@ pub fn hybrid(width: u32, height: u32, error: f32) -> Settings {
         error,
         integrator: Integrator::Hybrid,
         diffuse: DiffuseMode::Split,
+        classical: None,
         deadline: None,
         gather_rays: None,
         samples: None,

@@ -11,6 +11,7 @@ mod fuzz;
 mod ourselves;
 mod peers;
 mod scenes;
+mod stability;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
@@ -56,6 +57,8 @@ enum Chore {
         #[arg(long)]
         check: bool,
     },
+    /// Measure where each method fails, and write it down in assets/stability.md
+    Stability,
 }
 
 #[derive(Subcommand)]
@@ -83,6 +86,7 @@ fn main() -> Result<()> {
         Chore::Peers { what: None } => peers::list(),
         Chore::Peers { what: Some(Peers::Install) } => peers::install(),
         Chore::Scenes { check: false } => scenes::write(&root().join("assets")),
+        Chore::Stability => stability::run(),
         Chore::Scenes { check: true } => scenes::check(&root().join("assets")),
     }
 }

@@ -45,6 +45,7 @@ Examples:
   twolight render room.glb -o room.exr --time-limit 60s      the best that a minute gives
   twolight render room.glb -o room.exr --sky 1000            an even sky of 1000 cd/m2, if no lamp is in the file
   twolight render room.glb -o ref.exr --integrator path --spp 4096
+  twolight render room.glb -o room.exr --solver progressive --diffuse vertex --snapshots --preview room.png
 
 The EXR holds R,G,B,A and the layers direct, indirect, specular, emission (their sum is R,G,B), albedo,
 normal, depth, position, irradiance (lx) and variance. The same seed gives the same file, whatever the
@@ -93,7 +94,32 @@ pub struct RenderArgs {
     /// How the hybrid shades diffuse surfaces; `split` if absent
     #[arg(long, value_enum, help_heading = "Methods")]
     pub diffuse: Option<DiffuseArg>,
-    /// Rays from each vertex, in place of what --error asks for
+    /// How the radiosity is solved; `gather` if absent
+    #[arg(long, value_enum, help_heading = "Classical radiosity")]
+    pub solver: Option<SolverArg>,
+    /// Patches at most, in place of what --error asks for; a scene with more triangles keeps its own
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Classical radiosity")]
+    pub patches: Option<u32>,
+    /// Form factors by a hemicube, N pixels along an edge, in place of rays from all over a patch
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=2048), help_heading = "Classical radiosity")]
+    pub hemicube: Option<u32>,
+    /// Patches to vertices by the rule of 1985, which is not exact about energy
+    #[arg(long, help_heading = "Classical radiosity")]
+    pub corner_rule: bool,
+    /// Matrix: make form factors reciprocal
+    #[arg(long, help_heading = "Classical radiosity")]
+    pub reciprocal: bool,
+    /// Progressive: shoot what is going to arrive beforehand
+    #[arg(long, help_heading = "Classical radiosity")]
+    pub overshoot: bool,
+    /// Progressive: do not show light that is yet to be shot as if it were spread evenly
+    #[arg(long, help_heading = "Classical radiosity")]
+    pub no_ambient: bool,
+    /// Progressive: also write the picture after 0, 1, 2, 5, 10, 20, 50 ... shots, and with --preview one with and
+    /// without radiosity side by side
+    #[arg(long, help_heading = "Classical radiosity")]
+    pub snapshots: bool,
+    /// Rays from each vertex (or patch), in place of what --error asks for
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Methods")]
     pub gather_rays: Option<u32>,
     /// Rays through each pixel, in place of what --error asks for
@@ -123,6 +149,17 @@ pub enum IntegratorArg {
     Hybrid,
     /// Path tracing: slow, the reference
     Path,
+}
+
+/// `--solver`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SolverArg {
+    /// Rays gathered at the vertices of a mesh that is fine where light bends
+    Gather,
+    /// All form factors of constant patches, by Gauss and Seidel's iteration (1984)
+    Matrix,
+    /// The brightest patch shoots, again and again (1988)
+    Progressive,
 }
 
 /// `--diffuse`.

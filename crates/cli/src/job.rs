@@ -1,9 +1,11 @@
 //! What was typed, checked: a job that can be done, or the reason why not.
 
 use crate::args::{DiffuseArg, IntegratorArg, RenderArgs, WhichArgs};
+use crate::classical;
 use crate::values::SkyValue;
 use anyhow::Result;
 use geometry::Camera;
+use radiosity::classical::Config as Classical;
 use raytrace::output::check_writable;
 use raytrace::{DiffuseMode, Integrator, Settings};
 use std::path::{Path, PathBuf};
@@ -53,6 +55,10 @@ pub struct RenderJob {
     pub quiet: bool,
     /// Threads; all if absent.
     pub threads: Option<u32>,
+    /// Pictures on the way, of a progressive solver.
+    pub snapshots: bool,
+    /// A classical solver in place of the default one.
+    pub classical: Option<Classical>,
     size: Size,
     error: f32,
     seed: u64,
@@ -84,6 +90,7 @@ impl RenderJob {
                 "--diffuse, --gather-rays and --samples steer the hybrid, not --integrator path".into(),
             );
         }
+        let classical = classical::config(&args)?;
         if let Some((w, h)) = args.size {
             check_size(w, h)?;
         }
@@ -119,6 +126,8 @@ impl RenderJob {
             json: args.json,
             quiet: args.quiet,
             threads: args.threads,
+            snapshots: args.snapshots,
+            classical,
             size: match (args.size, args.width) {
                 (Some((w, h)), _) => Size::Both(w, h),
                 (None, Some(w)) => Size::Width(w),
@@ -152,6 +161,7 @@ impl RenderJob {
             error: self.error,
             integrator: self.integrator,
             diffuse: self.diffuse,
+            classical: self.classical.clone(),
             deadline: self.time_limit.map(|limit| Instant::now() + limit),
             gather_rays: self.gather_rays,
             samples: self.samples,

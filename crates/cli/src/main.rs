@@ -6,6 +6,7 @@
 
 mod args;
 mod cameras;
+mod classical;
 mod commands;
 mod contents;
 mod doctor;

@@ -154,6 +154,19 @@ impl Caustics {
         }
     }
 
+    /// Flux of the photons on each side of each leaf, lm, at index 2 · node + side; empty when there are none.
+    pub fn at_elements(&self, elements: &Elements) -> Vec<Rgb> {
+        if self.photons.is_empty() {
+            return Vec::new();
+        }
+        let mut flux = vec![Rgb::BLACK; 2 * elements.nodes.len()];
+        for photon in &self.photons {
+            let (leaf, _) = elements.locate(photon.triangle, photon.uv[0], photon.uv[1]);
+            flux[2 * leaf as usize + photon.side.index()] += photon.flux;
+        }
+        flux
+    }
+
     /// Irradiance by photons at every slot of the element mesh, lx: each photon's flux is shared among the corners
     /// of its leaf, so that Σ area · irradiance is the flux.
     pub fn at_vertices(&self, elements: &Elements, field: &Field) -> Vec<Rgb> {

@@ -25,12 +25,16 @@
 //! ```
 
 pub mod caustic;
+pub mod classical;
 mod clusters;
 pub mod element;
 pub mod field;
 pub mod flags;
+pub mod form_factor;
 pub mod gather;
 pub mod importance;
+pub mod patch_to_vertex;
+pub mod patches;
 pub mod reach;
 pub mod refine;
 mod sites;

@@ -29,15 +29,17 @@ pub struct Solution {
 /// How a solve went.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
+    /// Which solver of the classical ones, and its form factors; empty for the default.
+    pub solver: String,
     /// Vertices of the element mesh.
     pub vertices: usize,
     /// Leaves of the element mesh.
     pub elements: usize,
-    /// Sides of vertices where rays were gathered.
+    /// Sides of vertices where rays were gathered; patches, for the classical solvers.
     pub sites: usize,
     /// Gather rays that landed on a diffuse surface.
     pub landings: usize,
-    /// Bytes of the rows.
+    /// Bytes of the rows, or of the matrix.
     pub row_bytes: usize,
     /// How the iteration ended.
     pub convergence: Convergence,
@@ -68,6 +70,7 @@ impl Report {
     ) -> Report {
         let elements = &refiner.elements;
         Report {
+            solver: String::new(),
             vertices: elements.vertices.len(),
             elements: elements.leaves().count(),
             sites: refiner.field.sites.len(),
@@ -142,6 +145,28 @@ impl Solution {
             flags,
             direct,
             caustic_values: extra,
+            caustics,
+            report,
+        }
+    }
+
+    /// From values at the slots of a mesh, as the classical methods have them: no leaf is known to be pierced or coarse.
+    pub(crate) fn of_slots(
+        elements: Elements,
+        values: Vec<Rgb>,
+        usable: Vec<bool>,
+        direct: Vec<Rgb>,
+        caustic_values: Vec<Rgb>,
+        caustics: Caustics,
+        report: Report,
+    ) -> Solution {
+        Solution {
+            elements,
+            values,
+            usable,
+            flags: Flags::default(),
+            direct,
+            caustic_values,
             caustics,
             report,
         }

@@ -79,6 +79,19 @@ pub enum Error {
         /// Largest row sum.
         norm: f32,
     },
+    /// A form-factor matrix of so many patches does not fit.
+    #[error(
+        "the form factors of {patches} patches take {:.1} GB, and {:.1} GB are free: take fewer patches, or the progressive solver, which keeps none",
+        *bytes as f64 / 1e9, *most as f64 / 1e9
+    )]
+    TooLarge {
+        /// Patches.
+        patches: usize,
+        /// What their matrix would take.
+        bytes: u64,
+        /// What it may take.
+        most: u64,
+    },
 }
 
 /// Hears how far the work is, and may end it early.

@@ -1,5 +1,8 @@
 //! Solve E = D + K E to a stated bound.
 
+pub mod gauss_seidel;
+pub mod progressive;
+
 use geometry::Rgb;
 use rayon::prelude::*;
 

@@ -17,6 +17,7 @@
 //!     integrator: Integrator::Hybrid,
 //!     diffuse: DiffuseMode::Split,
 //!     deadline: None,
+//!     classical: None,
 //!     gather_rays: None,
 //!     samples: None,
 //!     verify: true,

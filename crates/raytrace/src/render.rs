@@ -15,7 +15,7 @@ use crate::plan::Plan;
 use crate::verify::{Judgement, Probes, Verdict};
 use geometry::sampling::Lattice2;
 use geometry::{Camera, World};
-use radiosity::{Config, Solution};
+use radiosity::{Config, Solution, classical};
 use rayon::prelude::*;
 use std::time::Instant;
 
@@ -59,6 +59,8 @@ pub struct Settings {
     pub integrator: Integrator,
     /// How diffuse surfaces are shaded.
     pub diffuse: DiffuseMode,
+    /// A classical radiosity method in place of the default one.
+    pub classical: Option<classical::Config>,
     /// When to stop with what there is.
     pub deadline: Option<Instant>,
     /// Rays from each vertex, in place of the number that `error` asks for.
@@ -165,9 +167,13 @@ pub fn prepass_for(
     // At most half of the time goes to the prepass; a rougher solution still makes a whole picture.
     let now = Instant::now();
     let deadline = settings.deadline.map(|end| now + end.saturating_duration_since(now) / 2);
+    let watch = Watch { progress, deadline };
+    if let Some(config) = &settings.classical {
+        return classical::solve(world, config, &watch);
+    }
     let aspect = settings.width as f32 / settings.height.max(1) as f32;
     let matters = (!cameras.is_empty()).then(|| importance(world, cameras, aspect));
-    radiosity::solve_for(world, &config, matters.as_ref(), &Watch { progress, deadline })
+    radiosity::solve_for(world, &config, matters.as_ref(), &watch)
 }
 
 /// Renders `world` as `camera` sees it. The hybrid integrator needs the `solution` of [`prepass`]; without one it is made here.
@@ -233,7 +239,9 @@ fn two_passes(
                 verdict = probes.as_ref().map(|probes| probes.judge(&film, settings.error));
                 clock.lap("verify");
             }
-            let missed = verdict.filter(|v| v.judgement() == Judgement::Missed);
+            // A classical method is shown as it is: what was asked of it are its patches.
+            let missed =
+                verdict.filter(|v| v.judgement() == Judgement::Missed && settings.classical.is_none());
             if let Some(verdict) = missed
                 && repairs < MOST_REPAIRS
                 && watch.has_time_for(clock.total())
@@ -306,11 +314,11 @@ fn budget(settings: &Settings, goal: f32) -> Budget {
 fn facts(r: &radiosity::Report) -> Vec<(String, String)> {
     let c = &r.convergence;
     let state = if c.converged { "converged" } else { "not converged" };
+    let (what, shape) =
+        if r.solver.is_empty() { ("gather", "sites gathered") } else { (&*r.solver, "patches") };
     let mut facts = vec![
-        (
-            "radiosity mesh",
-            format!("{} elements, {} vertices, {} sites gathered", r.elements, r.vertices, r.sites),
-        ),
+        ("radiosity solver", format!("{what}, {:.1} MB", r.row_bytes as f64 / 1e6)),
+        ("radiosity mesh", format!("{} elements, {} vertices, {} {shape}", r.elements, r.vertices, r.sites)),
         (
             "radiosity solve",
             format!(

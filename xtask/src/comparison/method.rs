@@ -59,6 +59,9 @@ pub fn ours() -> Vec<Method> {
         by_error("vertex", "twolight vertex", &["--diffuse", "vertex"]),
         by_error("split", "twolight split", &["--diffuse", "split"]),
         by_error("gather", "twolight gather", &["--diffuse", "gather"]),
+        by_error("matrix", "twolight matrix", &["--solver", "matrix"]),
+        by_error("progressive", "twolight progressive", &["--solver", "progressive"]),
+        by_error("hemicube", "twolight hemicube", &["--solver", "progressive", "--hemicube", "64"]),
         by_samples("path", "twolight path", Program::Twolight, &["--integrator", "path"]),
     ]
 }

@@ -3,6 +3,7 @@
 pub mod compare;
 pub mod inspect;
 pub mod render;
+mod snapshots;
 
 use std::io::{ErrorKind, Write};
 

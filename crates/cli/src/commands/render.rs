@@ -1,6 +1,6 @@
 //! `twolight render`: a scene to an EXR, and a picture to look at; and whether it is as exact as it was asked to be.
 
-use super::print;
+use super::{print, snapshots};
 use crate::args::RenderArgs;
 use crate::job::{RenderJob, with_name};
 use crate::progress::Bars;
@@ -62,10 +62,15 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
         let settings = job.settings(camera)?;
         if settings.integrator == Integrator::Hybrid && solution.is_none() {
             // Light does not know where we stand: one solution serves all views.
-            solution = Some(
-                prepass_for(&world, &choice.cameras, &settings, &bars)
+            solution = Some(match &job.classical {
+                Some(config) if job.snapshots => {
+                    let (solution, on_the_way) = snapshots::take(&job, &world, camera, config, &bars)?;
+                    pictures.extend(on_the_way);
+                    solution
+                }
+                _ => prepass_for(&world, &choice.cameras, &settings, &bars)
                     .with_context(|| format!("cannot solve {}", job.scene.display()))?,
-            );
+            });
             shared.push(("prepass", lap(&mut clock)));
         }
         let mut outcome = render(&world, camera, solution.as_ref(), &settings, &bars)?;
@@ -78,7 +83,12 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
             let why = if bars.interrupted() { "stopped" } else { "the time was up" };
             anyhow::bail!("{why} before a pixel was rendered: {} is not written", output.display());
         }
+        let pair = preview.as_ref().filter(|_| job.snapshots).map(|p| with_name(p, "without-and-with"));
+        let film = pair.is_some().then(|| outcome.film.clone());
         let picture = save(&job, camera, &settings, outcome, output, preview, rays)?;
+        if let (Some(pair), Some(film), Some(ev)) = (pair, film, picture.exposure) {
+            snapshots::side_by_side(&film, ev, &pair)?;
+        }
         if picture.repaired > 0 {
             let message = "pixels were not finite or negative and are black instead; please report it";
             bars.note(&format!("warning: {} {message}", picture.repaired));
@@ -116,7 +126,7 @@ struct Report {
 
 /// One picture that was written. What all pictures share, up to the prepass, is counted with the first.
 #[derive(Serialize)]
-struct Picture {
+pub(super) struct Picture {
     output: PathBuf,
     preview: Option<PathBuf>,
     camera: String,
@@ -158,7 +168,7 @@ impl From<Verdict> for Accuracy {
 }
 
 impl Picture {
-    fn line(&self) -> String {
+    pub(super) fn line(&self) -> String {
         let mut line = format!(
             "{}: {}x{}, camera {:?}, {:.1} s",
             self.output.display(),
@@ -187,7 +197,7 @@ fn lap(clock: &mut Instant) -> f64 {
 }
 
 /// Writes what was rendered.
-fn save(
+pub(super) fn save(
     job: &RenderJob,
     camera: &Camera,
     settings: &Settings,

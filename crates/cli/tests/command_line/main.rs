@@ -4,6 +4,7 @@ use assert_cmd::Command;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+mod classical;
 mod compare;
 mod render;
 

@@ -145,6 +145,13 @@ impl Elements {
 
     /// Calls `visit` for every leaf with its scene triangle and the barycentrics (u, v) of its middle there.
     pub fn visit_leaves(&self, roots: u32, mut visit: impl FnMut(u32, u32, [f32; 2])) {
+        self.visit_leaf_corners(roots, |leaf, root, uv| {
+            visit(leaf, root, [0, 1].map(|k| (uv[0][k] + uv[1][k] + uv[2][k]) / 3.0));
+        });
+    }
+
+    /// Calls `visit` for every leaf with its scene triangle and the barycentrics (u, v) of its corners there.
+    pub fn visit_leaf_corners(&self, roots: u32, mut visit: impl FnMut(u32, u32, [[f32; 2]; 3])) {
         for root in 0..roots {
             if self.nodes[root as usize].vertices[0] == VertexId::MAX {
                 continue;
@@ -153,8 +160,7 @@ impl Elements {
             while let Some((at, uv)) = open.pop() {
                 let node = &self.nodes[at as usize];
                 if node.is_leaf() {
-                    let middle = [0, 1].map(|k| (uv[0][k] + uv[1][k] + uv[2][k]) / 3.0);
-                    visit(at, root, middle);
+                    visit(at, root, uv);
                     continue;
                 }
                 let e = node.edge as usize;

@@ -45,6 +45,11 @@ pub fn html(results: &Results, parts: &Parts) -> String {
             tables::rays(results).html("Millions of rays per second on one thread")
         );
     }
+    let stability = crate::stability::html();
+    if !stability.is_empty() {
+        link("stability", "where methods fail");
+        body += &stability;
+    }
     link("methods", "methods");
     body += &methods(results);
     link("errors", "how errors are defined");
