@@ -16,6 +16,7 @@ pub fn hybrid(width: u32, height: u32, error: f32) -> Settings {
         deadline: None,
         gather_rays: None,
         samples: None,
+        verify: false,
     }
 }
 

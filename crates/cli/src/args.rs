@@ -12,7 +12,7 @@ use std::time::Duration;
     version,
     arg_required_else_help = true,
     after_help = "Results go to stdout, progress and warnings to stderr.\n\
-                  Exit status: 0 done, 1 failed, 2 asked wrongly.\n\n\
+                  Exit status: 0 done, 1 failed, 2 asked wrongly, 3 written but not as exact as asked.\n\n\
                   Start with:\n  \
                   twolight inspect room.glb\n  \
                   twolight render room.glb -o room.exr --preview room.png"
@@ -99,6 +99,9 @@ pub struct RenderArgs {
     /// Rays through each pixel, in place of what --error asks for
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Methods")]
     pub samples: Option<u32>,
+    /// Do not measure the picture's error by probes, nor go on where it is missed
+    #[arg(long)]
+    pub no_verify: bool,
     /// Seed of all random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
@@ -149,12 +152,21 @@ pub struct WhichArgs {
 
 /// Arguments of `inspect`.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  twolight inspect room.glb --json | jq .cameras")]
+#[command(after_help = "\
+Examples:
+  twolight inspect room.glb --json | jq .cameras
+  twolight inspect room.glb --plan --error 1%                what light is in it, and how it will be found")]
 pub struct InspectArgs {
     /// Scene, .gltf or .glb
     pub scene: PathBuf,
     #[command(flatten)]
     pub which: WhichArgs,
+    /// Say instead what light each camera sees, and how a render will find it
+    #[arg(long)]
+    pub plan: bool,
+    /// Error that the render would be asked for
+    #[arg(long, value_name = "PERCENT", default_value = "2%", requires = "plan", value_parser = values::share)]
+    pub error: f32,
     /// Print as JSON
     #[arg(long)]
     pub json: bool,

@@ -61,6 +61,7 @@ pub struct RenderJob {
     time_limit: Option<Duration>,
     gather_rays: Option<u32>,
     samples: Option<u32>,
+    verify: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -137,6 +138,7 @@ impl RenderJob {
             time_limit: args.time_limit,
             gather_rays: args.gather_rays,
             samples: args.samples,
+            verify: !args.no_verify,
         })
     }
 
@@ -153,6 +155,7 @@ impl RenderJob {
             deadline: self.time_limit.map(|limit| Instant::now() + limit),
             gather_rays: self.gather_rays,
             samples: self.samples,
+            verify: self.verify,
         })
     }
 

@@ -1,7 +1,8 @@
 //! The command line: parses, runs, prints and exits.
 //!
 //! What was typed ([`args`]) is checked and becomes a job ([`job`]), which one of [`commands`] does. Results go to
-//! stdout; progress, notes and warnings ([`progress`]) to stderr. Exit status: 0 done, 1 failed, 2 asked wrongly.
+//! stdout; progress, notes and warnings ([`progress`]) to stderr. Exit status: 0 done, 1 failed, 2 asked wrongly, 3 written
+//! but not as exact as asked.
 
 mod args;
 mod cameras;

@@ -26,8 +26,8 @@ pub struct World {
     pub scale: f32,
     /// Lowest and highest corner of the bounding box, m; zero without vertices.
     pub bounds: (Vec3, Vec3),
-    /// Whether any material lets light straight through.
-    see_through: bool,
+    /// Search tree over the triangles whose material may let light straight through, where there are any.
+    see_through: Option<Bvh>,
 }
 
 impl World {
@@ -36,7 +36,7 @@ impl World {
         let bvh = Bvh::build(&scene.mesh);
         let emitters = Emitters::build(&scene);
         let bounds = scene.mesh.bounds().unwrap_or_default();
-        let see_through = scene.materials.iter().any(|m| m.may_pass_straight());
+        let see_through = see_through(&scene).map(|mesh| Bvh::build(&mesh));
         let diagonal = (bounds.1 - bounds.0).length();
         let scale = room_size(&scene.mesh, &bvh, diagonal);
         World { bvh, emitters, diagonal, scale, bounds, see_through, scene }
@@ -51,7 +51,8 @@ impl World {
     /// through alpha, smooth thin glass and volumes that do not bend light, 0 behind anything else. Light that glass
     /// bends does not count.
     pub fn transmittance(&self, ray: &Ray) -> Rgb {
-        if !self.see_through {
+        // Few rays meet a pane or a leaf; the small tree tells which, and all others need no surface looked up.
+        if !self.see_through.as_ref().is_some_and(|panes| panes.occluded(ray)) {
             return if self.bvh.occluded(ray) { Rgb::BLACK } else { Rgb::WHITE };
         }
         let mut left = Rgb::WHITE;
@@ -80,6 +81,19 @@ impl World {
         }
         Rgb::BLACK
     }
+}
+
+/// The triangles whose material may let light straight through; `None` without any.
+fn see_through(scene: &Scene) -> Option<Mesh> {
+    let passes: Vec<bool> = scene.materials.iter().map(|m| m.may_pass_straight()).collect();
+    let of = scene.mesh.triangles.iter().zip(&scene.mesh.materials);
+    let triangles: Vec<[u32; 3]> =
+        of.filter(|(_, m)| passes.get(m.0 as usize).is_some_and(|&p| p)).map(|(t, _)| *t).collect();
+    (!triangles.is_empty()).then(|| Mesh {
+        positions: scene.mesh.positions.clone(),
+        triangles,
+        ..Mesh::default()
+    })
 }
 
 /// Share of light left after `way` m of a medium.

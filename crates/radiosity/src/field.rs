@@ -17,6 +17,9 @@ pub struct Site {
     pub side: Side,
     /// What was gathered.
     pub row: Row,
+    /// Estimated variance of its value (mean of the channels), lx²: of the light that emitters throw on what it sees
+    /// only, until the rest is solved for.
+    pub variance: f32,
 }
 
 /// Where a slot's value comes from.
@@ -84,11 +87,24 @@ impl Field {
     pub fn variance(&self, slot: usize) -> f32 {
         match &self.sources[slot] {
             Source::Nothing => 0.0,
-            Source::Site(i) => self.sites[*i as usize].row.variance,
+            Source::Site(i) => self.sites[*i as usize].variance,
             Source::Near(sites, weights) => {
-                sites.iter().zip(weights).map(|(&i, w)| w * w * self.sites[i as usize].row.variance).sum()
+                sites.iter().zip(weights).map(|(&i, w)| w * w * self.sites[i as usize].variance).sum()
             }
             Source::Between(a, b) => 0.25 * (self.variance(*a) + self.variance(*b)),
+        }
+    }
+
+    /// The site that a slot draws on most.
+    pub fn loudest(&self, slot: usize) -> Option<u32> {
+        match &self.sources[slot] {
+            Source::Nothing => None,
+            Source::Site(i) => Some(*i),
+            Source::Near(sites, weights) => {
+                let best = (0..4).max_by(|&a, &b| weights[a].total_cmp(&weights[b]).then(b.cmp(&a)))?;
+                Some(sites[best])
+            }
+            Source::Between(a, _) => self.loudest(*a),
         }
     }
 

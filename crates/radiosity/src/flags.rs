@@ -61,7 +61,8 @@ impl Flags {
 /// Corner weights of a point in a leaf, with the corners that must not speak for it left out and the rest scaled to
 /// sum to 1: those whose slot is not usable, and in a pierced leaf those that the point cannot see.
 ///
-/// `None` when no corner is usable. When none is visible, the usable ones speak after all.
+/// `None` when no corner is usable. When none is visible, the usable ones speak after all; when only unusable ones are,
+/// the weights are 0.
 pub(crate) fn visible_weights(
     world: &World,
     elements: &Elements,
@@ -85,12 +86,18 @@ pub(crate) fn visible_weights(
     let lift = |p: Vec3| offset_origin(p, normal) + normal * (1e-4 * world.scale);
     let at = lift(places[0] * w[0] + places[1] * w[1] + places[2] * w[2]);
     let middle = (places[0] + places[1] + places[2]) / 3.0;
-    let seen = std::array::from_fn(|i| {
+    let sees: [bool; 3] = std::array::from_fn(|i| {
         // Just inside the corner: the corner itself often lies in a wall's plane.
         let to = lift(places[i].lerp(middle, 0.02)) - at;
         let length = to.length();
-        let blocked = length > 0.0 && world.bvh.occluded(&Ray { t_max: length, ..Ray::new(at, to / length) });
-        if blocked { 0.0 } else { spoken[i] }
+        length <= 0.0 || !world.bvh.occluded(&Ray { t_max: length, ..Ray::new(at, to / length) })
     });
+    let seen = std::array::from_fn(|i| if sees[i] { spoken[i] } else { 0.0 });
+    // What sees only corners of which nothing is known, for no light comes to them, lies in the dark with them: the lit
+    // ones beyond the wall must not speak for it.
+    let in_the_dark = (0..3).any(|i| sees[i] && w[i] > 1e-6 && spoken[i] == 0.0);
+    if in_the_dark && normalise(seen).is_none() {
+        return Some([0.0; 3]);
+    }
     normalise(seen).or_else(|| normalise(spoken))
 }

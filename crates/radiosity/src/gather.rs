@@ -179,11 +179,14 @@ pub fn row(
         kept += followed.arrived * share;
         met_dead += u32::from(followed.first.is_some_and(|(t, side)| dead(t, side)));
     }
-    // Independent rays have a variance ∝ 1/n; a lattice of 64 leaves about half of it, and its error falls with n^-0.8
-    // (128 → 3.3 %, 1024 → 0.67 %, measured).
-    let lattice = 0.5 * (64.0 * share).powf(0.6);
-    let variance = lattice * (square - direct.mean().powi(2)).max(0.0) * share;
-    Row { direct, landings: landings.into_boxed_slice(), dead: met_dead as f32 * share, kept, variance }
+    let variance = lattice_share(rays) * (square - direct.mean().powi(2)).max(0.0) * share;
+    Row { direct, landings: landings.into_boxed_slice(), dead: met_dead as f32 * share, kept, variance, rays }
+}
+
+/// Share of the variance of independent rays that a lattice of `rays` leaves: about half of it with 64; its error falls
+/// with rays^-0.8 (128 → 3.3 %, 1024 → 0.67 %, measured).
+pub(crate) fn lattice_share(rays: u32) -> f32 {
+    0.5 * (64.0 / rays as f32).powf(0.6)
 }
 
 /// Irradiance (lx) straight from the emitters around the unit normal `ns`, by `samples` light samples shared evenly

@@ -30,14 +30,17 @@ pub mod element;
 pub mod field;
 pub mod flags;
 pub mod gather;
+pub mod importance;
 pub mod reach;
 pub mod refine;
 mod sites;
+mod smooth;
 pub mod solution;
 pub mod solver;
 pub mod transport;
 
 mod solve;
 
+pub use importance::Importance;
 pub use solution::{Report, Solution};
-pub use solve::{Config, Error, Progress, solve};
+pub use solve::{Config, Error, Progress, solve, solve_for};

@@ -1,7 +1,7 @@
-//! Which sides of which pieces of surface light can reach at all.
+//! Which sides of which faces light can reach at all.
 //!
 //! Both sides of a surface reflect, so each has an irradiance of its own; but the outside of a windowless room and
-//! the inside of a box are dark for ever. Random walks from either side of every piece tell them apart, whichever way
+//! the inside of a box are dark for ever. Random walks from either side of every face tell them apart, whichever way
 //! the triangles face: a side from which hardly any walk comes to a lit place is dead. It needs no gathering, and a
 //! vertex that sees mostly dead sides is buried inside something.
 
@@ -11,10 +11,15 @@ use geometry::sampling::{self, Rng};
 use geometry::{Mesh, Ray, Surface, Vec3, World};
 use rayon::prelude::*;
 
-/// Walks from each side of every piece, at most.
+/// Walks from each side of everything that is asked for, beside those shared.
 const WALKS: usize = 48;
 /// Walks shared among all sides by area beside those.
 const SHARED: usize = 60_000;
+/// A face of this share of all surface is asked for itself, smaller ones go by their piece: of what is finely modelled
+/// with hard edges every triangle is a face.
+const LARGE: f32 = 5e-4;
+/// Walks from a face of a lit piece before it is taken for dark.
+const STUBBORN: usize = 600;
 /// Surfaces that a walk meets at most.
 const LONGEST: usize = 10;
 /// A side is lit when one walk in so many comes to a lit place: fewer come through the cracks between a room's walls
@@ -26,7 +31,7 @@ const SELDOM: usize = 50;
 /// Which sides light reaches.
 #[derive(Clone, Debug)]
 pub struct Reach {
-    /// For each piece, front and back.
+    /// For each face, front and back.
     sides: Vec<[Lit; 2]>,
 }
 
@@ -40,53 +45,66 @@ struct Lit {
 }
 
 impl Reach {
-    /// Whether light can come to `side` of the piece numbered `piece`.
-    pub fn alive(&self, piece: u32, side: Side) -> bool {
-        self.sides[piece as usize][side.index()].at_all
+    /// Whether light can come to `side` of the face numbered `face`.
+    pub fn alive(&self, face: u32, side: Side) -> bool {
+        self.sides[face as usize][side.index()].at_all
     }
 
-    /// Whether an emitter shines straight on a good part of `side` of the piece numbered `piece`.
-    pub fn shone_on(&self, piece: u32, side: Side) -> bool {
-        self.sides[piece as usize][side.index()].directly
+    /// Whether an emitter shines straight on a good part of `side` of the face numbered `face`.
+    pub fn shone_on(&self, face: u32, side: Side) -> bool {
+        self.sides[face as usize][side.index()].directly
     }
 
     /// Walks from every side and looks whether it comes to a lit place.
     pub fn explore(world: &World, elements: &Elements, seed: u64) -> Reach {
-        let areas = Areas::new(&world.scene.mesh, elements);
-        let lit = |piece: usize| Side::BOTH.map(|side| walks(world, &areas, piece, side, seed));
-        Reach { sides: (0..elements.pieces as usize).into_par_iter().map(lit).collect() }
+        let mesh = &world.scene.mesh;
+        let pieces = Areas::new(mesh, elements.pieces, |t| elements.piece(t));
+        let lit = |piece: usize| Side::BOTH.map(|side| walks(world, &pieces, piece, side, 0, seed));
+        let of_pieces: Vec<[Lit; 2]> = (0..elements.pieces as usize).into_par_iter().map(lit).collect();
+        let faces = Areas::new(mesh, elements.faces, |t| elements.face(t));
+        let sides = (0..elements.faces as usize).into_par_iter().map(|face| {
+            let Some(&(t, _)) = faces.of[face].first() else { return [Lit::default(); 2] };
+            let piece = elements.piece(t).unwrap_or_default() as usize;
+            let (area, whole) = (faces.area(face), pieces.area(piece));
+            let part = area > LARGE * faces.total && area < 0.999 * whole;
+            Side::BOTH.map(|side| match of_pieces[piece][side.index()] {
+                lit if part && lit.at_all => walks(world, &faces, face, side, STUBBORN, seed ^ 1),
+                lit => lit,
+            })
+        });
+        Reach { sides: sides.collect() }
     }
 }
 
-/// The triangles of every piece with running sums of their areas.
+/// The triangles of every part (piece or face) with running sums of their areas.
 struct Areas {
     of: Vec<Vec<(u32, f32)>>,
     total: f32,
 }
 
 impl Areas {
-    fn new(mesh: &Mesh, elements: &Elements) -> Areas {
-        let mut of: Vec<Vec<(u32, f32)>> = vec![Vec::new(); elements.pieces as usize];
+    fn new(mesh: &Mesh, parts: u32, part: impl Fn(u32) -> Option<u32>) -> Areas {
+        let mut of: Vec<Vec<(u32, f32)>> = vec![Vec::new(); parts as usize];
         let mut total = 0.0;
         for t in 0..mesh.triangles.len() as u32 {
-            let Some(piece) = elements.piece(t) else { continue };
+            let Some(part) = part(t) else { continue };
             let area = mesh.area(t);
             total += area;
-            let before = of[piece as usize].last().map_or(0.0, |l| l.1);
-            of[piece as usize].push((t, before + area));
+            let before = of[part as usize].last().map_or(0.0, |l| l.1);
+            of[part as usize].push((t, before + area));
         }
         Areas { of, total }
     }
 
-    /// Area of a piece, m².
-    fn piece(&self, piece: usize) -> f32 {
-        self.of[piece].last().map_or(0.0, |l| l.1)
+    /// Area of a part, m².
+    fn area(&self, part: usize) -> f32 {
+        self.of[part].last().map_or(0.0, |l| l.1)
     }
 
-    /// A point of a piece, even in area.
-    fn point(&self, mesh: &Mesh, piece: usize, rng: &mut Rng) -> Option<(Vec3, Vec3)> {
-        let triangles = &self.of[piece];
-        let at = rng.f32() * self.piece(piece);
+    /// A point of a part, even in area.
+    fn point(&self, mesh: &Mesh, part: usize, rng: &mut Rng) -> Option<(Vec3, Vec3)> {
+        let triangles = &self.of[part];
+        let at = rng.f32() * self.area(part);
         let i = triangles.partition_point(|&(_, sum)| sum <= at).min(triangles.len().checked_sub(1)?);
         let t = triangles[i].0;
         let (u, v) = sampling::triangle(rng.vec2());
@@ -94,21 +112,21 @@ impl Areas {
     }
 }
 
-/// Walks from random points on one side of a piece: whether enough of them come to a lit place, and whether enough
-/// of the points are such places.
-fn walks(world: &World, areas: &Areas, piece: usize, side: Side, seed: u64) -> Lit {
-    let walks = WALKS + (SHARED as f32 * areas.piece(piece) / (2.0 * areas.total).max(1e-30)) as usize;
-    let enough = walks.div_ceil(RARE);
-    let mut rng = Rng::new(seed ^ 0x72_6561_6368, (2 * piece + side.index()) as u64);
-    let (mut lit, mut directly) = (0, 0);
-    for _ in 0..walks {
-        let Some((p, n)) = areas.point(&world.scene.mesh, piece, &mut rng) else { return Lit::default() };
+/// Walks from random points on one side of a part: whether enough of them come to a lit place, and whether enough
+/// of the points are such places. As long as none does, they go on until there were `stubborn` of them.
+fn walks(world: &World, areas: &Areas, part: usize, side: Side, stubborn: usize, seed: u64) -> Lit {
+    let walks = WALKS + (SHARED as f32 * areas.area(part) / (2.0 * areas.total).max(1e-30)) as usize;
+    let mut rng = Rng::new(seed ^ 0x72_6561_6368, (2 * part + side.index()) as u64);
+    let (mut lit, mut directly, mut done) = (0usize, 0usize, 0usize);
+    while done < walks || (lit < done.div_ceil(RARE) && done < stubborn) {
+        done += 1;
+        let Some((p, n)) = areas.point(&world.scene.mesh, part, &mut rng) else { return Lit::default() };
         let n = n * side.sign();
         let shone = shone_on(world, p, n, &mut rng);
         directly += usize::from(shone);
         lit += usize::from(shone || walk(world, p, n, &mut rng));
     }
-    Lit { at_all: lit >= enough, directly: directly >= walks.div_ceil(SELDOM) }
+    Lit { at_all: lit >= done.div_ceil(RARE), directly: directly >= done.div_ceil(SELDOM) }
 }
 
 /// Whether a walk from `p`, on a side of unit normal `n`, comes to a place that an emitter shines on, or to an emitter.

@@ -8,6 +8,7 @@ use crate::element::cluster;
 use crate::element::{EdgeMarks, Elements, Side, VertexId, slot};
 use crate::field::Field;
 use crate::flags::{Flags, visible_weights};
+use crate::importance::Importance;
 use crate::reach::Reach;
 use crate::solve::{Config, Progress};
 use crate::solver::{self, Convergence, Gain};
@@ -21,6 +22,9 @@ use std::collections::HashMap;
 /// A midpoint this far (relative) from its prediction, at the finest mesh, marks its surroundings for a gather of
 /// their own in pass 2.
 const ROUGH: f32 = 0.15;
+/// Times the variance of the noise that such a difference is to exceed: two standard deviations. With one, the gallery's
+/// pixels gathered for themselves wherever 80 rays a site happened to differ.
+const STANDS_OUT: f32 = 4.0;
 /// Elements (of h0² each) that the first mesh may have, about.
 const FIRST_ELEMENTS: f32 = 10_000.0;
 /// Rays that probe the middle of a leaf.
@@ -33,6 +37,7 @@ pub(crate) const INWARD: f32 = 0.02;
 pub(crate) struct Refiner<'a> {
     pub(crate) world: &'a World,
     pub(crate) config: &'a Config,
+    importance: Option<&'a Importance>,
     pub(crate) progress: &'a dyn Progress,
     pub(crate) elements: Elements,
     pub(crate) reach: Reach,
@@ -43,12 +48,25 @@ pub(crate) struct Refiner<'a> {
     diffuse: Vec<bool>,
     /// Vertices whose surroundings the mesh does not resolve.
     pub(crate) unresolved: Vec<VertexId>,
+    /// What an error matters at each slot, (0, 1]; empty where all matters alike.
+    weights: Vec<f32>,
     /// Longest edge of the first mesh, m.
     h0: f32,
     /// Shortest edge worth splitting to, m.
     pub(crate) h_min: f32,
     /// Reach of a site in finely tessellated surface, m.
     pub(crate) radius: f32,
+}
+
+/// What solving on the present mesh gave.
+pub(crate) struct Solved {
+    /// E at the sites, lx.
+    pub(crate) e: Vec<Rgb>,
+    /// Estimated variance of each (mean of the channels), lx².
+    pub(crate) variance: Vec<f32>,
+    pub(crate) convergence: Convergence,
+    /// ‖K‖∞.
+    pub(crate) norm: f32,
 }
 
 /// A vertex gathered to be compared with a prediction.
@@ -66,7 +84,12 @@ struct Test {
 
 impl<'a> Refiner<'a> {
     /// The first mesh: no edge longer than h0, sites where clusters of vertices need them, all gathered.
-    pub(crate) fn start(world: &'a World, config: &'a Config, progress: &'a dyn Progress) -> Refiner<'a> {
+    pub(crate) fn start(
+        world: &'a World,
+        config: &'a Config,
+        importance: Option<&'a Importance>,
+        progress: &'a dyn Progress,
+    ) -> Refiner<'a> {
         let scale = world.scale;
         let (h0, h_min, mut radius) =
             (config.h0 * scale, config.h_min * scale, config.cluster_radius * scale);
@@ -86,16 +109,19 @@ impl<'a> Refiner<'a> {
             diffuse,
             world,
             config,
+            importance,
             progress,
             elements,
             reach,
             field: Field::default(),
             e: Vec::new(),
             unresolved: Vec::new(),
+            weights: Vec::new(),
             h0,
             h_min,
             radius,
         };
+        refiner.weigh();
         let used = refiner.used();
         let choose = |radius: f32| {
             let candidates = (0..used.len() as VertexId).filter(|&v| used[v as usize]);
@@ -113,6 +139,18 @@ impl<'a> Refiner<'a> {
         refiner.radius = radius;
         refiner.gather(&chosen.into_iter().map(|v| (v, [true; 2])).collect::<Vec<_>>());
         refiner
+    }
+
+    /// Finds anew what matters, after the mesh was refined.
+    fn weigh(&mut self) {
+        if let Some(importance) = self.importance {
+            self.weights = importance.weights(&self.elements);
+        }
+    }
+
+    /// What an error at a slot matters, (0, 1].
+    pub(crate) fn weight(&self, slot: usize) -> f32 {
+        self.weights.get(slot).copied().unwrap_or(1.0)
     }
 
     /// Tests and refines until the tolerance, the finest edge, the sites, the rounds or the time run out.
@@ -153,15 +191,15 @@ impl<'a> Refiner<'a> {
             self.settle();
             let values = self.field.spread(&self.e);
             let floor = 0.1 * mean(&self.e).mean();
-            let errors: Vec<f32> = tests.iter().map(|t| self.error(t, &values, floor)).collect();
+            let errors: Vec<[f32; 2]> = tests.iter().map(|t| self.error(t, &values, floor)).collect();
             rough.resize(self.elements.vertices.len(), false);
             let mut failed = vec![false; self.elements.vertices.len()];
-            for (test, &error) in tests.iter().zip(&errors) {
+            for (test, &[error, rough_error]) in tests.iter().zip(&errors) {
                 let weighed = error * (test.length / self.h0).min(1.0);
                 // What stands on an edge is worth a quarter of the tolerance: the light may be even all the same.
                 failed[test.vertex as usize] =
                     weighed > self.config.tolerance * if test.parted { 0.25 } else { 1.0 };
-                rough[test.vertex as usize] = error > ROUGH;
+                rough[test.vertex as usize] = rough_error > ROUGH;
             }
             edges = self.edges_longer_than(2.0 * self.h_min, |v| failed[v as usize]);
             edges.extend(kept);
@@ -210,44 +248,46 @@ impl<'a> Refiner<'a> {
         room: usize,
     ) -> (Vec<((VertexId, VertexId), [bool; 2])>, Vec<(VertexId, VertexId)>, Vec<Member>) {
         // Two ends that agree may still hide a bend between them: a tenth of what is there, and of what is elsewhere on
-        // this side of the piece. So a panel of which most corners lie dark behind a frame is looked at too.
+        // this side of the face. So a panel of which most corners lie dark behind a frame is looked at too.
         const HIDDEN: f32 = 0.1;
         let values = self.field.spread(&self.e);
         let floor = 0.1 * mean(&self.e).mean();
-        let elsewhere = self.means_of_pieces();
-        let promise =
-            |difference: f32, level: f32, slot: usize| match level + elsewhere[self.piece_slot(slot)] {
-                // Without indirect light there may be the direct one, for those who take it from the vertices.
-                0.0 => {
-                    if self.reach.shone_on(self.elements.vertices[slot / 2].piece, Side::BOTH[slot % 2]) {
-                        HIDDEN
-                    } else {
-                        0.0
-                    }
+        let elsewhere = self.means_of_faces();
+        let promise = |difference: f32, level: f32, slot: usize| match level + elsewhere[self.face_slot(slot)]
+        {
+            // Without indirect light there may be the direct one, for those who take it from the vertices.
+            0.0 => {
+                if self.reach.shone_on(self.elements.vertices[slot / 2].face, Side::BOTH[slot % 2]) {
+                    HIDDEN
+                } else {
+                    0.0
                 }
-                around => (difference + HIDDEN * around) / (level + floor),
-            };
+            }
+            around => (difference + HIDDEN * around) / (level + floor),
+        };
         let change = |a: VertexId, b: VertexId| {
-            let piece = self.elements.vertices[a as usize].piece;
+            let face = self.elements.vertices[a as usize].face;
             Side::BOTH.map(|side| {
-                if !self.reach.alive(piece, side) {
+                if !self.reach.alive(face, side) {
                     return 0.0;
                 }
                 let (sa, sb) = (slot(a, side), slot(b, side));
-                match (self.field.usable(sa), self.field.usable(sb)) {
-                    (true, true) => {
-                        let (va, vb) = (values[sa], values[sb]);
-                        promise((va - vb).map(f32::abs).mean(), 0.5 * (va + vb).mean(), sa)
+                let matters = self.weight(sa).max(self.weight(sb));
+                matters
+                    * match (self.field.usable(sa), self.field.usable(sb)) {
+                        (true, true) => {
+                            let (va, vb) = (values[sa], values[sb]);
+                            promise((va - vb).map(f32::abs).mean(), 0.5 * (va + vb).mean(), sa)
+                        }
+                        // A buried end says nothing of the rest.
+                        _ => 1.0,
                     }
-                    // A buried end says nothing of the rest.
-                    _ => 1.0,
-                }
             })
         };
         let around = |v: VertexId| {
             let of = |&side: &Side| {
                 let s = slot(v, side);
-                promise(self.field.spread_around(s, &self.e), values[s].mean(), s)
+                self.weight(s) * promise(self.field.spread_around(s, &self.e), values[s].mean(), s)
             };
             Side::BOTH.iter().filter(|&&side| self.field.usable(slot(v, side))).map(of).fold(0.0, f32::max)
         };
@@ -273,23 +313,24 @@ impl<'a> Refiner<'a> {
         )
     }
 
-    /// Mean E of each side of each piece, lx, over its sites.
-    fn means_of_pieces(&self) -> Vec<f32> {
-        let mut sums = vec![(0.0, 0u32); 2 * self.elements.pieces as usize];
+    /// Mean E of each side of each face, lx, over its sites.
+    fn means_of_faces(&self) -> Vec<f32> {
+        let mut sums = vec![(0.0, 0u32); 2 * self.elements.faces as usize];
         for (site, e) in self.field.sites.iter().zip(&self.e) {
-            let sum = &mut sums[self.piece_slot(slot(site.vertex, site.side))];
+            let sum = &mut sums[self.face_slot(slot(site.vertex, site.side))];
             *sum = (sum.0 + e.mean(), sum.1 + 1);
         }
         sums.into_iter().map(|(sum, n)| sum / n.max(1) as f32).collect()
     }
 
-    /// Number of the side of a piece that a slot lies on.
-    fn piece_slot(&self, slot: usize) -> usize {
-        2 * self.elements.vertices[slot / 2].piece as usize + slot % 2
+    /// Number of the side of a face that a slot lies on.
+    fn face_slot(&self, slot: usize) -> usize {
+        2 * self.elements.vertices[slot / 2].face as usize + slot % 2
     }
 
-    /// Relative difference of what was gathered from what was predicted, the worse side.
-    fn error(&self, test: &Test, values: &[Rgb], floor: f32) -> f32 {
+    /// Relative difference of what was gathered from what was predicted, the worse side: by what it matters, and as such
+    /// where it stands out of the rays' noise (the two of [`ROUGH`]).
+    fn error(&self, test: &Test, values: &[Rgb], floor: f32) -> [f32; 2] {
         Side::BOTH
             .iter()
             .filter(|side| test.sides[side.index()] && self.field.usable(slot(test.vertex, **side)))
@@ -302,16 +343,17 @@ impl<'a> Refiner<'a> {
                         (s + values[slot] * k, w + k, n + k * k * self.field.variance(slot))
                     });
                 if weight <= 0.0 {
-                    return 1.0; // nothing around it speaks for it
+                    return [1.0; 2]; // nothing around it speaks for it
                 }
                 let predicted = sum / weight;
                 let difference = (got - predicted).map(f32::abs).mean();
                 // What the rays' own noise explains is no bend of the light.
                 let noise = known_variance / (weight * weight) + self.field.variance(slot(test.vertex, side));
-                let bend = (difference * difference - noise).max(0.0).sqrt();
-                bend / (0.5 * (got + predicted).mean() + floor).max(1e-30)
+                let level = (0.5 * (got + predicted).mean() + floor).max(1e-30);
+                let beyond = |noise: f32| (difference * difference - noise).max(0.0).sqrt() / level;
+                [self.weight(slot(test.vertex, side)) * beyond(noise), beyond(STANDS_OUT * noise)]
             })
-            .fold(0.0, f32::max)
+            .fold([0.0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])])
     }
 
     /// Splits the edges; each midpoint is a test on the sides named.
@@ -323,6 +365,7 @@ impl<'a> Refiner<'a> {
             marks.mark(a, b);
         }
         self.elements.split(&mut marks);
+        self.weigh();
         let midpoints = marks.split_edges();
         for &(a, b, m) in &midpoints {
             self.field.put_between(m, [a, b]);
@@ -340,7 +383,7 @@ impl<'a> Refiner<'a> {
     /// Whether something stands on the edge from `a` to `b`, on a side that light reaches.
     fn parted(&self, a: VertexId, b: VertexId) -> bool {
         let (a, b) = (&self.elements.vertices[a as usize], &self.elements.vertices[b as usize]);
-        Side::BOTH.iter().filter(|&&side| self.reach.alive(a.piece, side)).any(|&side| {
+        Side::BOTH.iter().filter(|&&side| self.reach.alive(a.face, side)).any(|&side| {
             let lift = 1e-4 * self.world.scale * side.sign();
             let (from, to) = (a.position + a.normal * lift, b.position + b.normal * lift);
             let length = from.distance(to);
@@ -369,7 +412,7 @@ impl<'a> Refiner<'a> {
             let node = &self.elements.nodes[leaf as usize];
             let corners = self.elements.corners(leaf);
             let piece = self.elements.vertices[node.vertices[0] as usize].piece;
-            let lit = Side::BOTH.iter().any(|&side| self.reach.alive(piece, side));
+            let lit = Side::BOTH.iter().any(|&side| self.reach.alive(self.elements.face_of(leaf), side));
             if !lit || !self.diffuse[piece as usize] {
                 continue;
             }
@@ -388,17 +431,13 @@ impl<'a> Refiner<'a> {
     /// Solves on what there is, roughly: for predictions, not for pictures.
     fn settle(&mut self) {
         let tolerance = 0.02 * mean(&self.e).mean();
-        self.e = self.solved(tolerance, 12, &[], &Flags::default()).0;
+        let settled = self.solved(tolerance, 12, &[], &Flags::default());
+        self.e = settled.e;
+        self.field.sites.iter_mut().zip(settled.variance).for_each(|(site, v)| site.variance = v);
     }
 
     /// Solves E = D + K (E + extra) to `tolerance` lx from the present E, in at most `most` steps; also ‖K‖∞.
-    pub(crate) fn solved(
-        &self,
-        tolerance: f32,
-        most: u32,
-        extra: &[Rgb],
-        flags: &Flags,
-    ) -> (Vec<Rgb>, Convergence, f32) {
+    pub(crate) fn solved(&self, tolerance: f32, most: u32, extra: &[Rgb], flags: &Flags) -> Solved {
         let usable = |s: usize| self.field.usable(s);
         let transport = Transport::locate(&self.elements, &self.field, |node, side, w| {
             visible_weights(self.world, &self.elements, flags, usable, node, side, w)
@@ -411,7 +450,8 @@ impl<'a> Refiner<'a> {
         };
         let (e, convergence) =
             solver::solve(self.e.clone(), gain, tolerance, most, |e| transport.apply(e, extra));
-        (e, convergence, norm)
+        let variance = transport.variance(&e);
+        Solved { e, variance, convergence, norm }
     }
 
     /// Where pass 2 should gather for itself.
@@ -422,7 +462,7 @@ impl<'a> Refiner<'a> {
         }
         Flags::collect(&self.elements, |n, side| {
             let corners = self.elements.nodes[n as usize].vertices;
-            if !self.reach.alive(self.elements.vertices[corners[0] as usize].piece, side) {
+            if !self.reach.alive(self.elements.vertices[corners[0] as usize].face, side) {
                 return (false, false);
             }
             // Of a leaf with all corners in other things (a shelf between books) the mesh knows nothing.

@@ -22,52 +22,82 @@ impl Refiner<'_> {
             .flat_map(|&(v, sides)| Side::BOTH.map(|side| (v, side, sides[side.index()])))
             .filter(|&(.., wanted)| wanted)
             .map(|(v, side, _)| (v, side))
-            .filter(|&(v, side)| self.reach.alive(self.elements.vertices[v as usize].piece, side))
+            .filter(|&(v, side)| self.reach.alive(self.elements.vertices[v as usize].face, side))
             .filter(|(v, _)| origins.contains_key(v))
             .collect();
         let mut rays = self.config.rays;
-        let mut rows = self.gather_rows(&jobs, &origins, rays);
+        let mut rows = self.gather_rows(&jobs, &origins, |s| self.rays_for(s));
         // Where few rays find the light (a sunny patch, a lamp behind a shade) it takes more of them.
         for _ in 0..2 {
             rays *= 4;
             let all = self.field.sites.iter().map(|s| &s.row).chain(&rows).map(|r| r.direct);
             let floor = 0.1 * mean(&all.collect::<Vec<_>>()).mean();
-            let noisy = |r: &Row| r.variance.sqrt() > self.config.noise * (r.direct.mean() + floor);
-            let which: Vec<usize> = (0..rows.len()).filter(|&i| noisy(&rows[i])).collect();
+            let noisy = |i: &usize| {
+                let (row, (v, side)) = (&rows[*i], jobs[*i]);
+                self.weight(slot(v, side)) * row.variance.sqrt()
+                    > self.config.noise * (row.direct.mean() + floor)
+            };
+            let which: Vec<usize> = (0..rows.len()).filter(noisy).collect();
             if which.is_empty() || self.progress.stopped() {
                 break;
             }
             let again: Vec<(VertexId, Side)> = which.iter().map(|&i| jobs[i]).collect();
-            for (i, row) in which.into_iter().zip(self.gather_rows(&again, &origins, rays)) {
+            for (i, row) in which.into_iter().zip(self.gather_rows(&again, &origins, |_| rays)) {
                 rows[i] = row;
             }
         }
         self.e.extend(rows.iter().map(|row| row.direct));
-        let sites = jobs.into_iter().zip(rows).map(|((vertex, side), row)| Site { vertex, side, row });
+        let sites = jobs.into_iter().zip(rows).map(|((vertex, side), row)| Site {
+            vertex,
+            side,
+            variance: row.variance,
+            row,
+        });
         self.field.sites.extend(sites);
         self.field.connect(self.world, &self.elements, self.radius);
     }
 
-    /// Rows of `rays` rays each, fewer where landings would take more memory than they may.
+    /// Rays that a slot gets at first. What nobody sees is averaged over many sites before it shows.
+    fn rays_for(&self, slot: usize) -> u32 {
+        const LEAST: u32 = 32;
+        let all = self.config.rays;
+        ((all as f32 * self.weight(slot)) as u32).next_multiple_of(16).max(LEAST.min(all))
+    }
+
+    /// Rows of as many rays as `rays` says for a slot, fewer where landings would take more memory than they may.
     fn gather_rows(
         &self,
         jobs: &[(VertexId, Side)],
         origins: &HashMap<VertexId, Vec<Origin>>,
-        rays: u32,
+        rays: impl Fn(usize) -> u32 + Sync,
     ) -> Vec<Row> {
         let held: usize = self.field.sites.iter().map(|s| s.row.landings.len()).sum();
         let room = self.config.most_landings.saturating_sub(held) / jobs.len().max(1);
-        let pattern = Lattice2::new(rays.min(room as u32).max(16));
+        let room = u32::try_from(room).unwrap_or(u32::MAX);
+        let rays: Vec<u32> = jobs.iter().map(|&(v, side)| rays(slot(v, side)).min(room).max(16)).collect();
+        let mut patterns: HashMap<u32, Lattice2> = HashMap::new();
+        for &n in &rays {
+            patterns.entry(n).or_insert_with(|| Lattice2::new(n));
+        }
         self.progress.stage("gathering", jobs.len() as u64);
         let dead =
-            |t: u32, side: Side| self.elements.piece(t).is_none_or(|piece| !self.reach.alive(piece, side));
+            |t: u32, side: Side| self.elements.face(t).is_none_or(|face| !self.reach.alive(face, side));
         jobs.par_iter()
-            .map(|&(vertex, side)| {
+            .zip(&rays)
+            .map(|(&(vertex, side), &rays)| {
                 let turned = turned(&origins[&vertex], side);
                 let normal = self.elements.vertices[vertex as usize].normal * side.sign();
                 // Another number of rays draws other numbers: a row that is done again shares nothing with the first.
                 let stream = (u64::from(rays) << 40) ^ slot(vertex, side) as u64;
-                let row = gather::row(self.world, &turned, normal, &pattern, self.config.seed, stream, dead);
+                let row = gather::row(
+                    self.world,
+                    &turned,
+                    normal,
+                    &patterns[&rays],
+                    self.config.seed,
+                    stream,
+                    dead,
+                );
                 self.progress.advance(1);
                 row
             })
@@ -108,36 +138,33 @@ impl Refiner<'_> {
         let normals = vertices.map(|v| self.elements.vertices[v as usize].normal);
         let smooth = (normals[0] + normals[1] + normals[2]).normalize_or(ng);
         let dead =
-            |t: u32, side: Side| self.elements.piece(t).is_none_or(|piece| !self.reach.alive(piece, side));
-        Side::BOTH.iter().filter(|&&side| self.reach.alive(self.elements.piece_of(leaf) as u32, side)).any(
-            |&side| {
-                let origins = [Origin { position: middle, ng: ng * side.sign() }];
-                let stream = (1 << 62) | slot(leaf, side) as u64;
-                let normal = smooth * side.sign();
-                let row = gather::row(self.world, &origins, normal, pattern, self.config.seed, stream, dead);
-                if row.dead > 0.5 {
-                    return false; // the middle is buried
-                }
-                let mut got = row.direct;
-                for landing in row.landings.iter() {
-                    let (triangle, side) = landing.place();
-                    let (u, v) = landing.uv();
-                    let (node, w) = self.elements.locate(triangle, u, v);
-                    let corners = self.elements.nodes[node as usize].vertices;
-                    got +=
-                        landing.weight() * (0..3).map(|i| values[slot(corners[i], side)] * w[i]).sum::<Rgb>();
-                }
-                let known = vertices.map(|v| slot(v, side)).into_iter().filter(|&s| self.field.usable(s));
-                let (sum, count) = known.fold((Rgb::BLACK, 0.0), |(s, n), slot| (s + values[slot], n + 1.0));
-                if count == 0.0 {
-                    return true; // no corner knows anything of it
-                }
-                let predicted = sum.mean() / count;
-                let off = (got.mean() - predicted).abs();
-                // Twice as bright or half as dark, and beyond two standard errors of so few rays.
-                off > 0.5 * (predicted + floor) && off * off > 4.0 * row.variance
-            },
-        )
+            |t: u32, side: Side| self.elements.face(t).is_none_or(|face| !self.reach.alive(face, side));
+        Side::BOTH.iter().filter(|&&side| self.reach.alive(self.elements.face_of(leaf), side)).any(|&side| {
+            let origins = [Origin { position: middle, ng: ng * side.sign() }];
+            let stream = (1 << 62) | slot(leaf, side) as u64;
+            let normal = smooth * side.sign();
+            let row = gather::row(self.world, &origins, normal, pattern, self.config.seed, stream, dead);
+            if row.dead > 0.5 {
+                return false; // the middle is buried
+            }
+            let mut got = row.direct;
+            for landing in row.landings.iter() {
+                let (triangle, side) = landing.place();
+                let (u, v) = landing.uv();
+                let (node, w) = self.elements.locate(triangle, u, v);
+                let corners = self.elements.nodes[node as usize].vertices;
+                got += landing.weight() * (0..3).map(|i| values[slot(corners[i], side)] * w[i]).sum::<Rgb>();
+            }
+            let known = vertices.map(|v| slot(v, side)).into_iter().filter(|&s| self.field.usable(s));
+            let (sum, count) = known.fold((Rgb::BLACK, 0.0), |(s, n), slot| (s + values[slot], n + 1.0));
+            if count == 0.0 {
+                return true; // no corner knows anything of it
+            }
+            let predicted = sum.mean() / count;
+            let off = (got.mean() - predicted).abs();
+            // Twice as bright or half as dark, and beyond two standard errors of so few rays.
+            off > 0.5 * (predicted + floor) && off * off > 4.0 * row.variance
+        })
     }
 
     /// Direct irradiance at every slot, lx: `samples` light samples at each site.

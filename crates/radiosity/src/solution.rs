@@ -97,8 +97,7 @@ fn balance(world: &World, refiner: &Refiner, extra: &[Rgb], direct: &[Rgb]) -> f
         let area = geometry::triangle::area(a, b, c);
         let n = world.scene.mesh.geometric_normal(t);
         for side in Side::BOTH {
-            let piece = elements.vertices[elements.nodes[leaf as usize].vertices[0] as usize].piece;
-            if !refiner.reach.alive(piece, side) {
+            if !refiner.reach.alive(elements.face_of(leaf), side) {
                 continue;
             }
             let n = n * side.sign();

@@ -1,7 +1,9 @@
 //! The whole prepass: mesh, gather, refine, photons, solve.
 
 use crate::caustic::Caustics;
-use crate::refine::{Refiner, mean};
+use crate::importance::Importance;
+use crate::refine::{Refiner, Solved, mean};
+use crate::smooth;
 use crate::solution::{Report, Solution};
 use geometry::World;
 use thiserror::Error;
@@ -102,7 +104,17 @@ impl Progress for () {
 ///
 /// Fails only when there is no finite answer; an unfinished one is a rougher picture, and the report says so.
 pub fn solve(world: &World, config: &Config, progress: &dyn Progress) -> Result<Solution, Error> {
-    let mut refiner = Refiner::start(world, config, progress);
+    solve_for(world, config, None, progress)
+}
+
+/// The same, with less care where `importance` says that it matters less.
+pub fn solve_for(
+    world: &World,
+    config: &Config,
+    importance: Option<&Importance>,
+    progress: &dyn Progress,
+) -> Result<Solution, Error> {
+    let mut refiner = Refiner::start(world, config, importance, progress);
     refiner.refine();
     progress.stage("caustics", 1);
     let caustics = Caustics::trace(world, &refiner.elements, config.photons, config.seed);
@@ -110,11 +122,12 @@ pub fn solve(world: &World, config: &Config, progress: &dyn Progress) -> Result<
     progress.stage("solving", 1);
     let flags = refiner.flags();
     let tolerance = config.solve_tolerance * mean(&refiner.e).mean();
-    let (e, convergence, norm) = refiner.solved(tolerance, 500, &extra, &flags);
+    let Solved { e, variance, convergence, norm } = refiner.solved(tolerance, 500, &extra, &flags);
     if !e.iter().all(|e| e.is_finite()) {
         return Err(Error::Diverged { iterations: convergence.iterations, norm });
     }
     refiner.e = e;
+    refiner.e = smooth::smoothed(&refiner, &flags, &variance);
     let direct = refiner.direct(config.light_samples);
     let report = Report::new(world, &refiner, &flags, &extra, &direct, convergence, norm, &caustics);
     Ok(Solution::new(refiner, flags, extra, direct, caustics, report))

@@ -6,6 +6,7 @@
 
 use crate::element::{Elements, Side, slot};
 use crate::field::Field;
+use crate::gather::lattice_share;
 use geometry::Rgb;
 use half::f16;
 use rayon::prelude::*;
@@ -63,6 +64,8 @@ pub struct Row {
     pub kept: f32,
     /// Estimated variance of `direct` (mean of the channels), lx².
     pub variance: f32,
+    /// Rays that were sent.
+    pub rays: u32,
 }
 
 /// A landing found in the present element mesh: up to three slots with their weights.
@@ -146,17 +149,42 @@ impl<'a> Transport<'a> {
             .map(|row| {
                 let mut sum = Rgb::BLACK;
                 for landing in row {
-                    let [a, b, c] = self.elements.nodes[landing.node as usize].vertices;
-                    let (wa, wb) =
-                        (f32::from(landing.bary[0]) / 65535.0, f32::from(landing.bary[1]) / 65535.0);
-                    let value = values[slot(a, landing.side)] * wa
-                        + values[slot(b, landing.side)] * wb
-                        + values[slot(c, landing.side)] * (1.0 - wa - wb);
-                    sum += Rgb::from(landing.weight.map(f32::from)) * value;
+                    sum += Rgb::from(landing.weight.map(f32::from)) * self.value(&values, landing);
                 }
                 sum
             })
             .collect()
+    }
+
+    /// Estimated variance (mean of the channels) of every site's value under `e`, lx²: what another shift of its rays
+    /// would change.
+    pub fn variance(&self, e: &[Rgb]) -> Vec<f32> {
+        let values = self.field.spread(e);
+        self.rows
+            .par_iter()
+            .zip(&self.field.sites)
+            .map(|(row, site)| {
+                let (mut sum, mut square) = (0.0, 0.0);
+                for landing in row {
+                    let brought =
+                        (Rgb::from(landing.weight.map(f32::from)) * self.value(&values, landing)).mean();
+                    sum += brought;
+                    square += brought * brought;
+                }
+                let rays = site.row.rays.max(1);
+                let spread = (square - sum * sum / rays as f32).max(0.0);
+                site.row.variance + lattice_share(rays) * spread
+            })
+            .collect()
+    }
+
+    /// What a landing finds there.
+    fn value(&self, values: &[Rgb], landing: &Located) -> Rgb {
+        let [a, b, c] = self.elements.nodes[landing.node as usize].vertices;
+        let (wa, wb) = (f32::from(landing.bary[0]) / 65535.0, f32::from(landing.bary[1]) / 65535.0);
+        values[slot(a, landing.side)] * wa
+            + values[slot(b, landing.side)] * wb
+            + values[slot(c, landing.side)] * (1.0 - wa - wb)
     }
 
     /// The largest row sum, any channel: how much of an error one bounce keeps, at most.

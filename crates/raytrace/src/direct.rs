@@ -19,12 +19,21 @@ const EVEN: f32 = 0.2;
 
 /// How many rays to spend, and which strata this pixel takes of the pattern that its neighbours complete.
 #[derive(Clone, Copy, Debug)]
-pub struct Spend {
+pub struct Spend<'a> {
     /// Shadow rays for a light that brings all of the light: a power of four.
     pub samples: u32,
     /// Place in the 4 × 4 block of pixels, 0 … 15.
     pub phase: u32,
+    /// Points of the surface that shadow rays start from in turn, at least one: the edge of a shadow may run through the
+    /// pixel.
+    pub places: &'a [Vec3],
 }
+
+/// From one place to the next: no divisor of the numbers of places, which are powers of four and less, so that strata of
+/// the lamp and places do not go hand in hand.
+const STRIDE: usize = 7;
+/// Points at most that a point-like lamp is looked for from.
+const PLACES: usize = 64;
 
 /// Which lights are sampled at a point, how often.
 #[derive(Debug, Default)]
@@ -41,6 +50,8 @@ struct Entry {
     samples: u32,
     /// Probability with which it is chosen for each of the samples: 1 where they are its own.
     chance: f32,
+    /// About its unshadowed irradiance, mean of the channels, lx.
+    irradiance: f32,
 }
 
 impl Plan {
@@ -54,35 +65,32 @@ impl Plan {
         if total <= 0.0 {
             return Plan::default();
         }
-        let mut entries = Vec::new();
-        let (mut small, mut pool) = (0.0, 0);
-        for &(group, w) in &groups {
-            if w >= OWN * total {
-                // The strata come in powers of four; a light that brings a quarter of the light deserves a quarter of
-                // the rays for the same noise.
-                let share = (samples as f32 * w / total).max(1.0);
-                let own = 4u32.pow(share.log(4.0).ceil() as u32).min(samples);
-                entries.push(Entry { group, samples: own, chance: 1.0 });
-            } else {
-                small += w;
+        let is_small = |w: f32| w > 0.0 && w < OWN * total;
+        let (few, small) =
+            groups.iter().filter(|g| is_small(g.1)).fold((0.0, 0.0), |(n, sum), g| (n + 1.0, sum + g.1));
+        let (few, pool) = if few > 1.0 { (few, (samples / 8).max(1)) } else { (0.0, 0) };
+        let entry = |(group, irradiance): (Group, f32)| {
+            if pool > 0 && is_small(irradiance) {
+                let chance = (1.0 - EVEN) * irradiance / small + EVEN / few;
+                return Entry { group, samples: pool, chance, irradiance };
             }
-        }
-        if small > 0.0 {
-            pool = (samples / 8).max(1);
-            let few: Vec<_> = groups.iter().filter(|&&(_, w)| w > 0.0 && w < OWN * total).collect();
-            let chance = |w: f32| (1.0 - EVEN) * w / small + EVEN / few.len() as f32;
-            entries.extend(few.iter().map(|&&(group, w)| Entry { group, samples: pool, chance: chance(w) }));
-        }
-        Plan { entries, pool }
+            // The strata come in powers of four; a light that brings a quarter of the light deserves a quarter of
+            // the rays for the same noise.
+            let share = (samples as f32 * irradiance / total).max(1.0);
+            let own = (0..8).map(|k| 4u32.pow(k)).find(|&n| n as f32 >= share);
+            Entry { group, samples: own.unwrap_or(samples).min(samples), chance: 1.0, irradiance }
+        };
+        Plan { entries: groups.into_iter().filter(|g| g.1 > 0.0).map(entry).collect(), pool }
     }
 
     /// Expected number of samples per solid angle (1/sr) toward `point` on the emissive `triangle`: what multiple
     /// importance sampling weighs a ray that ran into it by.
     pub fn density(&self, world: &World, p: Vec3, n: Vec3, triangle: u32, point: Vec3) -> f32 {
-        let of = |e: &Entry| {
+        let Some(light) = world.emitters.light_of_triangle(triangle) else { return 0.0 };
+        let entry = self.entries.iter().find(|e| world.emitters.is_in_group(e.group, light));
+        entry.map_or(0.0, |e| {
             e.samples as f32 * e.chance * world.emitters.pdf_in_group(e.group, p, n, triangle, point)
-        };
-        self.entries.iter().map(of).sum()
+        })
     }
 
     /// As [`Plan::density`], toward the sky.
@@ -141,29 +149,43 @@ pub fn direct(
     let mut out = Direct::default();
     let mut unshadowed = 0.0;
     let has_diffuse = surface.bsdf.has_diffuse();
-    for &Entry { group, samples, chance } in plan.entries.iter().filter(|e| e.chance == 1.0) {
-        let kind = match group {
-            Group::Light(light) => Some(&world.emitters.lights()[light as usize]),
-            Group::Branch(_) => None,
-        };
-        let exact = match kind {
-            Some(EmitterKind::Polygon(shape)) => Some(shape.irradiance(surface.position, surface.ns)),
-            _ => None,
-        };
-        let samples = if matches!(kind, Some(EmitterKind::Punctual(_))) { 1 } else { samples };
+    let (p, n) = (surface.position, surface.ns);
+    for &Entry { group, samples, irradiance, .. } in plan.entries.iter().filter(|e| e.chance == 1.0) {
         let mut part = Part::default();
-        for k in 0..samples {
-            let u = stratum(k, samples, spend.phase, rng);
-            let Some(s) = world.emitters.sample_group(&world.scene, group, surface.position, surface.ns, u)
-            else {
-                part.count += 1;
-                continue;
-            };
-            part.add(world, surface, wo, &s, samples as f32 * chance, gloss, has_diffuse);
+        let mut add = |part: &mut Part, samples: u32, sample: &dyn Fn([f32; 2]) -> Option<LightSample>| {
+            for k in 0..samples {
+                match sample(stratum(k, samples, spend.phase, rng)) {
+                    Some(s) => {
+                        let from = spend.places[(k as usize * STRIDE) % spend.places.len()];
+                        part.add(world, surface, wo, &s, from, samples as f32, gloss, has_diffuse);
+                    }
+                    None => part.count += 1,
+                }
+            }
+        };
+        let mut exact = None;
+        match group {
+            Group::Light(light) => {
+                let kind = &world.emitters.lights()[light as usize];
+                if let EmitterKind::Polygon(shape) = kind {
+                    exact = Some(if shape.looks_small(p, n) {
+                        shape.irradiance(p, n)
+                    } else {
+                        shape.radiance * (irradiance / shape.radiance.mean())
+                    });
+                }
+                let punctual = matches!(kind, EmitterKind::Punctual(_));
+                let samples = if punctual { spend.places.len().min(PLACES) as u32 } else { samples };
+                let Some(seen) = world.emitters.seen_from(light, p) else { continue };
+                add(&mut part, samples, &|u| seen.sample(&world.scene, u));
+            }
+            Group::Branch(_) => {
+                add(&mut part, samples, &|u| world.emitters.sample_group(&world.scene, group, p, n, u));
+            }
         }
         part.finish(exact, &mut out, &mut unshadowed);
     }
-    pooled(world, surface, wo, plan, gloss, rng, &mut out, &mut unshadowed);
+    pooled(world, surface, wo, plan, gloss, spend, rng, &mut out, &mut unshadowed);
     out.visible = if unshadowed > 0.0 { (out.irradiance.luminance() / unshadowed).min(1.0) } else { 1.0 };
     out
 }
@@ -188,6 +210,7 @@ impl Part {
         surface: &Surface,
         wo: Vec3,
         s: &LightSample,
+        from: Vec3,
         times: f32,
         gloss: Gloss,
         diffuse: bool,
@@ -201,7 +224,7 @@ impl Part {
         if arriving.is_black() && f_glossy.is_black() {
             return;
         }
-        let open = world.transmittance(&s.shadow_ray(surface.position, surface.ng));
+        let open = world.transmittance(&s.seen_from(surface.position, from).shadow_ray(from, surface.ng));
         if open.is_black() {
             return;
         }
@@ -270,27 +293,28 @@ fn pooled(
     wo: Vec3,
     plan: &Plan,
     gloss: Gloss,
+    spend: Spend,
     rng: &mut Rng,
     out: &mut Direct,
     unshadowed: &mut f32,
 ) {
-    let small: Vec<_> = plan.entries.iter().filter(|e| e.chance < 1.0).collect();
-    if small.is_empty() {
-        return;
-    }
+    let small = || plan.entries.iter().filter(|e| e.chance < 1.0);
     let mut part = Part::default();
-    for _ in 0..plan.pool {
-        let mut u = rng.f32();
-        let chosen = small.iter().find(|e| {
+    for k in 0..plan.pool {
+        // Neighbouring pixels choose in turn: the 4 × 4 of them take even shares of the groups.
+        let strata = (16 * plan.pool) as f32;
+        let mut u = ((16 * k + spend.phase) as f32 + rng.f32()) / strata;
+        let chosen = small().find(|e| {
             u -= e.chance;
             u < 0.0
         });
-        let &&Entry { group, chance, .. } = chosen.unwrap_or(&small[small.len() - 1]);
+        let Some(&Entry { group, chance, .. }) = chosen.or_else(|| small().next_back()) else { return };
         let u = [rng.f32(), rng.f32()];
         match world.emitters.sample_group(&world.scene, group, surface.position, surface.ns, u) {
             Some(s) => {
                 let s = LightSample { pdf: s.pdf * chance, ..s };
-                part.add(world, surface, wo, &s, plan.pool as f32, gloss, surface.bsdf.has_diffuse());
+                let from = spend.places[(k as usize * STRIDE) % spend.places.len()];
+                part.add(world, surface, wo, &s, from, plan.pool as f32, gloss, surface.bsdf.has_diffuse());
             }
             None => part.count += 1,
         }

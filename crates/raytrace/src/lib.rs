@@ -19,6 +19,7 @@
 //!     deadline: None,
 //!     gather_rays: None,
 //!     samples: None,
+//!     verify: true,
 //! };
 //! // Without a solution it makes its own; for many views, pass that of `prepass`.
 //! let outcome = render(&world, &room.cameras[0], None, &settings, &())?;
@@ -28,17 +29,23 @@
 
 pub mod difference;
 pub mod direct;
+pub mod effort;
 pub mod error;
 pub mod exr;
 pub mod film;
 pub mod flip;
+pub mod importance;
 pub mod integrator;
 pub mod metrics;
 pub mod output;
 pub mod pixel;
+pub mod plan;
 pub mod render;
 pub mod tonemap;
+pub mod verify;
 
 pub use error::Error;
 pub use film::{Film, Pixel};
-pub use render::{DiffuseMode, Integrator, Outcome, Progress, Report, Settings, prepass, render};
+pub use render::{
+    DiffuseMode, Integrator, Outcome, Progress, Report, Settings, prepass, prepass_for, render,
+};

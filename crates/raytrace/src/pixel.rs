@@ -73,14 +73,16 @@ pub struct Shot {
     pub effort: Effort,
     /// What its first ray met; `None` for nothing.
     pub key: Option<Key>,
-    /// Visible share of the direct light.
-    pub visible: f32,
+    /// Luminance of the direct irradiance of what covers most of the pixel, lx.
+    pub lit: f32,
+    /// What of it is sent on toward the eye, 1/sr.
+    pub sent: f32,
     /// Variance of the luminance from rays through the pixel: edges, textures, gloss.
     pub camera_variance: f32,
     /// Variance of the luminance from shadow rays.
     pub light_variance: f32,
-    /// A texture or a gloss varies within the pixel: one ray through it does not tell.
-    pub fine: bool,
+    /// Rays through the pixel go on by way of mirrors, glass or gloss.
+    pub specular: bool,
 }
 
 /// One surface seen through a pixel: hits that belong together.
@@ -99,10 +101,11 @@ pub fn shade(hybrid: &Hybrid, view: &View, x: u32, y: u32, effort: Effort, seed:
         pixel: Pixel { samples: n, ..Pixel::default() },
         effort,
         key: None,
-        visible: 1.0,
+        lit: 0.0,
+        sent: 0.0,
         camera_variance: 0.0,
         light_variance: 0.0,
-        fine: false,
+        specular: false,
     };
     let mut sky = Rgb::BLACK;
     for i in 0..n {
@@ -140,7 +143,6 @@ pub fn shade(hybrid: &Hybrid, view: &View, x: u32, y: u32, effort: Effort, seed:
     let spread: f32 = levels.iter().map(|&(p, l)| p * (l - mean) * (l - mean)).sum();
     // An edge through a jittered grid of n: the share of one side has variance ∝ n^-1.5.
     shot.camera_variance += spread * share.powf(1.5);
-    shot.pixel.variance += shot.camera_variance + shot.light_variance;
     shot
 }
 
@@ -225,12 +227,18 @@ fn one_surface(
     p.irradiance += lit.irradiance * coverage;
     p.albedo += mean_albedo * part;
     let (mut sum, mut steps, mut before) = (Rgb::BLACK, 0.0, None);
+    // Light of the diffuse surface per luminance of its texture.
+    let per_albedo = lit.irradiance.luminance() / std::f32::consts::PI;
     for &i in &g.hits {
         let (ray, surface) = &hits[i];
         let beside = hybrid.beside_diffuse(surface, ray, &plan, rng);
         p.emission += beside.emission * share;
         sum += beside.specular;
-        let level = beside.specular.luminance();
+        let mut level = beside.specular.luminance();
+        if textured {
+            level += beside.emission.luminance()
+                + per_albedo * surface.bsdf.diffuse_albedo(-ray.direction).luminance();
+        }
         steps += before.replace(level).map_or(0.0, |before: f32| (level - before).powi(2));
         p.normal += surface.ns * share;
         p.depth += surface.position.distance(ray.origin) * share / shot_alpha(hits.len() as f32 * share);
@@ -245,12 +253,10 @@ fn one_surface(
     shot.light_variance += lit.variance * coverage * coverage;
     p.variance += lit.gather_variance * coverage * coverage;
     if part > 0.49 {
-        shot.visible = lit.visible;
+        shot.lit = lit.straight.luminance();
+        shot.sent = albedo.luminance() * surface.coverage / std::f32::consts::PI;
     }
-    let gloss = surface.bsdf.has_specular()
-        && !surface.bsdf.is_delta()
-        && surface.bsdf.specular_albedo(wo).max_channel() > 0.01;
-    shot.fine |= textured || gloss || surface.coverage < 1.0;
+    shot.specular |= surface.bsdf.has_specular() || surface.coverage < 1.0;
 }
 
 fn shot_alpha(alpha: f32) -> f32 {

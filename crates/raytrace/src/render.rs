@@ -1,13 +1,18 @@
-//! Pixels over threads, and where to spend samples.
+//! The two passes, until the picture is what was asked for: pixels over threads, and again where probes find fault.
 //!
 //! Every pixel is a function of (seed, place, effort) alone, so the picture does not depend on threads. A first pass
-//! gives every pixel one ray; then those that need more are done again with four times as many rays of the kind they
-//! lack, until their estimated error is below the one asked for.
+//! gives every pixel one ray; then those where it brings most are done again with more ([`effort`]). Probes that never
+//! see the solution say how exact the picture is ([`crate::verify`]); if it surely is not what was asked, samples or
+//! mesh become finer, by as much as was missing.
 
+use crate::effort::{self, Budget, Noise};
 use crate::film::{Film, Pixel};
+use crate::importance::importance;
 use crate::integrator::hybrid::Hybrid;
 use crate::integrator::path;
-use crate::pixel::{Effort, Key, Shot, View, shade};
+use crate::pixel::{Effort, Shot, View, shade};
+use crate::plan::Plan;
+use crate::verify::{Judgement, Probes, Verdict};
 use geometry::sampling::Lattice2;
 use geometry::{Camera, World};
 use radiosity::{Config, Solution};
@@ -60,7 +65,27 @@ pub struct Settings {
     pub gather_rays: Option<u32>,
     /// Rays through each pixel at most, in place of the number that `error` asks for.
     pub samples: Option<u32>,
+    /// Whether to measure the picture's error by probes, and to go on where it is missed.
+    pub verify: bool,
 }
+
+/// Of the square of the error asked, the share that samples may leave as noise; the rest is for the first pass.
+const NOISE_SHARE: f32 = 0.5;
+/// What the first pass is asked for, in units of the error asked.
+const MESH_SHARE: f32 = 0.85;
+/// Every pixel's first effort.
+const FIRST: Effort = Effort { camera: 1, shadow: 4 };
+/// Rays through one pixel, and shadow rays for one surface, at most: the edge of a lamp before a dark wall wants many.
+pub(crate) const MOST_SAMPLES: u32 = 16_384;
+/// Rounds of refinement at most.
+const MOST_ROUNDS: u32 = 6;
+/// Times at most that a picture which missed the error asked is made better.
+const MOST_REPAIRS: u32 = 2;
+/// An error is missed by so much more than it seems, for the next step is not known exactly.
+const MARGIN: f32 = 0.8;
+/// Rays for the probes at most: so many, and this share of what both passes took.
+const PROBE_RAYS: u64 = 300_000;
+const PROBE_SHARE: u64 = 4;
 
 /// How a render went.
 #[derive(Clone, Debug, Default)]
@@ -71,6 +96,8 @@ pub struct Report {
     pub texts: Vec<(String, String)>,
     /// How the prepass went; `None` for the path tracer.
     pub radiosity: Option<radiosity::Report>,
+    /// How exact the picture is; `None` where that was not asked, or not done for want of time.
+    pub verdict: Option<Verdict>,
 }
 
 /// A picture and how it came about.
@@ -102,20 +129,45 @@ impl Progress for Watch<'_> {
     }
 }
 
+impl Watch<'_> {
+    /// Whether twice as many `seconds` are left.
+    fn has_time_for(&self, seconds: f64) -> bool {
+        let left = |end: Instant| end.saturating_duration_since(Instant::now()).as_secs_f64();
+        !self.stopped() && self.deadline.is_none_or(|end| left(end) > 2.0 * seconds)
+    }
+}
+
 /// The prepass that `settings` ask for. It does not depend on the camera: solve once, render any number of views.
 pub fn prepass(
     world: &World,
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Solution, radiosity::Error> {
-    let mut config = Config { seed: settings.seed, ..Config::for_error(settings.error) };
+    prepass_for(world, &[], settings, progress)
+}
+
+/// The prepass for views by `cameras`: it takes care of what they see and of what lights that, and less of the rest. One
+/// serves them all; for other views it is rougher. Without cameras everything matters alike.
+pub fn prepass_for(
+    world: &World,
+    cameras: &[Camera],
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Solution, radiosity::Error> {
+    let mut config = Config { seed: settings.seed, ..Config::for_error(MESH_SHARE * settings.error) };
     if let Some(rays) = settings.gather_rays {
         config.rays = rays;
+    }
+    if settings.diffuse != DiffuseMode::Vertex {
+        // Direct light at the vertices is for the energy balance only then: an eighth of a furnished room's rays otherwise.
+        config.light_samples = 8;
     }
     // At most half of the time goes to the prepass; a rougher solution still makes a whole picture.
     let now = Instant::now();
     let deadline = settings.deadline.map(|end| now + end.saturating_duration_since(now) / 2);
-    radiosity::solve(world, &config, &Watch { progress, deadline })
+    let aspect = settings.width as f32 / settings.height.max(1) as f32;
+    let matters = (!cameras.is_empty()).then(|| importance(world, cameras, aspect));
+    radiosity::solve_for(world, &config, matters.as_ref(), &Watch { progress, deadline })
 }
 
 /// Renders `world` as `camera` sees it. The hybrid integrator needs the `solution` of [`prepass`]; without one it is made here.
@@ -128,30 +180,126 @@ pub fn render(
 ) -> Result<Outcome, radiosity::Error> {
     let watch = Watch { progress, deadline: settings.deadline };
     let view = View { camera, width: settings.width, height: settings.height };
-    let mut report = Report::default();
-    let start = Instant::now();
-    let (film, finished) = match settings.integrator {
-        Integrator::Path { spp } => trace_paths(world, &view, spp, settings.seed, &watch),
-        Integrator::Hybrid => {
-            let made;
-            let solution = match solution {
-                Some(solution) => solution,
-                None => {
-                    made = prepass(world, settings, progress)?;
-                    report.stages.push(("prepass", start.elapsed().as_secs_f64()));
-                    &made
-                }
-            };
-            report.texts = facts(&solution.report);
-            report.radiosity = Some(solution.report.clone());
-            let rays = ((256.0 * (0.02 / settings.error)) as u32).clamp(64, 1024);
-            let hybrid = Hybrid { world, solution, mode: settings.diffuse, pattern: Lattice2::new(rays) };
-            hybrid_film(&hybrid, &view, settings, &watch)
+    match settings.integrator {
+        Integrator::Path { spp } => {
+            let start = Instant::now();
+            let (film, finished) = trace_paths(world, &view, spp, settings.seed, &watch);
+            let report =
+                Report { stages: vec![("image", start.elapsed().as_secs_f64())], ..Report::default() };
+            Ok(Outcome { film, finished, report })
         }
-    };
-    let before: f64 = report.stages.iter().map(|s| s.1).sum();
-    report.stages.push(("image", start.elapsed().as_secs_f64() - before));
-    Ok(Outcome { film, finished, report })
+        Integrator::Hybrid => two_passes(world, &view, solution, settings, &watch),
+    }
+}
+
+/// The hybrid picture, made better until the probes do not find the error missed.
+fn two_passes(
+    world: &World,
+    view: &View,
+    solution: Option<&Solution>,
+    settings: &Settings,
+    watch: &Watch,
+) -> Result<Outcome, radiosity::Error> {
+    let cameras = std::slice::from_ref(view.camera);
+    let mut clock = Clock { last: Instant::now(), stages: Vec::new() };
+    // What each pass is asked for: less than the user asks, once that was missed.
+    let (mut mesh_error, mut noise_error) = (settings.error, noise_goal(settings.error));
+    let mut made = None;
+    if solution.is_none() {
+        made = Some(prepass_for(world, cameras, settings, watch.progress)?);
+        clock.lap("prepass");
+    }
+    let plan = Plan::new(world, view, settings.error, settings.seed);
+    clock.lap("plan");
+    let (mut probes, mut repairs) = (None, 0);
+    loop {
+        let solution = made.as_ref().or(solution).expect("given or made");
+        let rays = ((256.0 * (0.02 / mesh_error)) as u32).clamp(64, 1024);
+        let hybrid = Hybrid { world, solution, mode: settings.diffuse, pattern: Lattice2::new(rays) };
+        let before = world.bvh.rays_cast();
+        let mut picture = Adaptive { hybrid: &hybrid, view, seed: settings.seed, shots: Vec::new() };
+        let mut finished = picture.start(watch);
+        let finer_mesh = loop {
+            finished = finished && picture.refine(&budget(settings, noise_error), watch);
+            let (film, noise) = picture.film();
+            clock.lap("image");
+            let mut verdict = None;
+            if finished && settings.verify {
+                // Beside each gather ray that lands goes a shadow ray.
+                let took = world.bvh.rays_cast() - before + 2 * solution.report.landings as u64;
+                let rays = PROBE_RAYS + took / PROBE_SHARE;
+                let trace = || Probes::trace(world, view, &film, settings.error, settings.seed, rays, watch);
+                probes = probes.or_else(trace);
+                verdict = probes.as_ref().map(|probes| probes.judge(&film, settings.error));
+                clock.lap("verify");
+            }
+            let missed = verdict.filter(|v| v.judgement() == Judgement::Missed);
+            if let Some(verdict) = missed
+                && repairs < MOST_REPAIRS
+                && watch.has_time_for(clock.total())
+            {
+                repairs += 1;
+                let step = MARGIN * (verdict.asked / verdict.error) as f32;
+                // Whichever is the larger part of the error becomes smaller by what is missing.
+                if f64::from(noise).powi(2) > 0.5 * verdict.error.powi(2) {
+                    noise_error *= step;
+                    continue;
+                }
+                mesh_error *= step;
+                break mesh_error;
+            }
+            let mut report = Report {
+                stages: clock.stages,
+                texts: facts(&solution.report),
+                radiosity: Some(solution.report.clone()),
+                verdict,
+            };
+            report.texts.push(("plan".into(), plan.to_string()));
+            if let Some(verdict) = verdict {
+                report.texts.push(("error measured".into(), verdict.to_string()));
+            }
+            report.texts.push(("noise".into(), format!("{:.2} % estimated", 100.0 * noise)));
+            return Ok(Outcome { film, finished, report });
+        };
+        let finer = Settings { error: finer_mesh, ..settings.clone() };
+        made = Some(prepass_for(world, cameras, &finer, watch.progress)?);
+        clock.lap("prepass");
+    }
+}
+
+/// Time by stage.
+struct Clock {
+    last: Instant,
+    stages: Vec<(&'static str, f64)>,
+}
+
+impl Clock {
+    /// Adds the time since the last call to `stage`.
+    fn lap(&mut self, stage: &'static str) {
+        let seconds = std::mem::replace(&mut self.last, Instant::now()).elapsed().as_secs_f64();
+        match self.stages.iter_mut().find(|s| s.0 == stage) {
+            Some(known) => known.1 += seconds,
+            None => self.stages.push((stage, seconds)),
+        }
+    }
+
+    fn total(&self) -> f64 {
+        self.stages.iter().map(|s| s.1).sum()
+    }
+}
+
+/// Relative error that samples may leave in a picture of relative error `error`.
+pub(crate) fn noise_goal(error: f32) -> f32 {
+    error * NOISE_SHARE.sqrt()
+}
+
+/// What samples may leave as noise.
+fn budget(settings: &Settings, goal: f32) -> Budget {
+    Budget {
+        goal,
+        most_camera: settings.samples.map_or(MOST_SAMPLES, |n| n.max(1)),
+        most_shadow: MOST_SAMPLES,
+    }
 }
 
 /// What the prepass found, for the file and the user.
@@ -192,169 +340,66 @@ fn over_pixels<T: Send>(which: &[u32], watch: &Watch, pixel: impl Fn(u32) -> T +
 }
 
 /// The adaptive picture.
-fn hybrid_film(hybrid: &Hybrid, view: &View, settings: &Settings, watch: &Watch) -> (Film, bool) {
-    let pixels = view.width * view.height;
-    let ladder = Ladder::new(settings);
-    let seed = settings.seed;
-    let at = |i: u32, effort| shade(hybrid, view, i % view.width, i / view.width, effort, seed);
-    watch.stage("image", u64::from(pixels));
-    let everywhere: Vec<u32> = (0..pixels).collect();
-    let first = Effort { camera: 1, shadow: 4 };
-    let mut shots: Vec<Option<Shot>> = over_pixels(&everywhere, watch, |i| at(i, first));
-    let mut finished = shots.iter().all(Option::is_some);
-    let mut rung = 0;
-    while finished {
-        let wanted = ladder.climb(&shots, view, rung);
-        if wanted.is_empty() {
-            break;
-        }
-        watch.stage("refining", wanted.len() as u64);
-        let which: Vec<u32> = (0..wanted.len() as u32).collect();
-        let again = over_pixels(&which, watch, |k| {
-            let (i, effort) = wanted[k as usize];
-            at(i, effort)
-        });
-        finished = again.iter().all(Option::is_some);
-        for (&(i, _), shot) in wanted.iter().zip(again) {
-            if shot.is_some() {
-                shots[i as usize] = shot;
+struct Adaptive<'a> {
+    hybrid: &'a Hybrid<'a>,
+    view: &'a View<'a>,
+    seed: u64,
+    shots: Vec<Option<Shot>>,
+}
+
+impl Adaptive<'_> {
+    /// One ray through every pixel; whether all were reached.
+    fn start(&mut self, watch: &Watch) -> bool {
+        let pixels = self.view.width * self.view.height;
+        watch.stage("image", u64::from(pixels));
+        let everywhere: Vec<u32> = (0..pixels).collect();
+        self.shots = over_pixels(&everywhere, watch, |i| self.shade(i, FIRST));
+        self.shots.iter().all(Option::is_some)
+    }
+
+    /// Does those pixels again that need it, until the noise is within `budget`; whether it came to that.
+    fn refine(&mut self, budget: &Budget, watch: &Watch) -> bool {
+        for _ in 0..MOST_ROUNDS {
+            let noise = effort::noise(&self.shots, self.view);
+            let wanted = effort::next(&self.shots, &noise, budget);
+            if wanted.is_empty() {
+                return true;
+            }
+            watch.stage("refining", wanted.len() as u64);
+            let which: Vec<u32> = (0..wanted.len() as u32).collect();
+            let again = over_pixels(&which, watch, |k| {
+                let (i, effort) = wanted[k as usize];
+                self.shade(i, effort)
+            });
+            let finished = again.iter().all(Option::is_some);
+            for (&(i, _), shot) in wanted.iter().zip(again) {
+                if shot.is_some() {
+                    self.shots[i as usize] = shot;
+                }
+            }
+            if !finished {
+                return false;
             }
         }
-        rung += 1;
-    }
-    let done = shots.into_iter().map(|s| s.map_or_else(Pixel::default, |s| s.pixel)).collect();
-    (Film::from_pixels(view.width, view.height, done), finished)
-}
-
-/// Which pixels get more, and how much at most.
-struct Ladder {
-    /// Estimated relative error of a pixel above which it gets more.
-    target: f32,
-    most_camera: u32,
-    most_shadow: u32,
-}
-
-impl Ladder {
-    fn new(settings: &Settings) -> Ladder {
-        let error = settings.error;
-        let steps = |base: f32| 4u32.pow((base / error).log(4.0).ceil().clamp(1.0, 6.0) as u32);
-        // Half of the error asked: the first pass has errors too, and in simple rooms takes most of the time.
-        Ladder {
-            target: error / 2.0,
-            most_camera: settings.samples.map_or(steps(2.4), |n| n.max(1)),
-            most_shadow: steps(2.4),
-        }
+        true
     }
 
-    /// The pixels that need more than they had, with their next effort.
-    fn climb(&self, shots: &[Option<Shot>], view: &View, rung: u32) -> Vec<(u32, Effort)> {
-        let m = level(shots);
-        let (w, h) = (view.width as i64, view.height as i64);
-        (0..shots.len() as u32)
-            .into_par_iter()
-            .filter_map(|i| {
-                let shot = shots[i as usize].as_ref()?;
-                let beauty = shot.pixel.beauty();
-                let den =
-                    (beauty.r * beauty.r + beauty.g * beauty.g + beauty.b * beauty.b) / 3.0 + 0.01 * m * m;
-                let relative = |variance: f32| (variance / den.max(1e-30)).sqrt();
-                let (x, y) = (i64::from(i) % w, i64::from(i) / w);
-                let (camera_variance, light_variance) = pooled_variance(shots, shot, (x, y), (w, h));
-                let mut camera = relative(camera_variance) > self.target;
-                let mut shadow = relative(light_variance) > self.target;
-                camera |= rung == 0 && shot.fine;
-                for k in 0..9 {
-                    let (nx, ny) = (x + k % 3 - 1, y + k / 3 - 1);
-                    if k == 4 || nx < 0 || ny < 0 || nx >= w || ny >= h {
-                        continue;
-                    }
-                    let Some(other) = &shots[(ny * w + nx) as usize] else { continue };
-                    if !same_surface(&shot.key, &other.key) {
-                        // Rays that all met one surface may have missed a sliver of the other, half of what one of
-                        // them stands for on average.
-                        let missed =
-                            (other.pixel.beauty() - beauty).luminance() * (0.5 / shot.effort.camera as f32);
-                        camera |= rung == 0 || missed * missed > self.target * self.target * den;
-                    } else if rung == 0 {
-                        shadow |= (shot.visible - other.visible).abs() > 0.03;
-                        let step = (shot.pixel.specular - other.pixel.specular).luminance();
-                        camera |= step * step > self.target * den;
-                        // A caustic's edge may run through the pixel.
-                        let step = (shot.pixel.indirect - other.pixel.indirect).luminance();
-                        camera |= step * step > 16.0 * self.target * self.target * den;
-                    }
-                }
-                let next = Effort {
-                    camera: if camera {
-                        more(shot.effort.camera, 16, self.most_camera)
-                    } else {
-                        shot.effort.camera
-                    },
-                    shadow: if shadow {
-                        more(shot.effort.shadow, 16, self.most_shadow)
-                    } else {
-                        shot.effort.shadow
-                    },
-                };
-                (next != shot.effort).then_some((i, next))
-            })
-            .collect()
+    fn shade(&self, i: u32, effort: Effort) -> Shot {
+        shade(self.hybrid, self.view, i % self.view.width, i / self.view.width, effort, self.seed)
     }
-}
 
-/// Variance by camera rays and by shadow rays of the pixel (x, y), the mean of what it and its neighbours on the same
-/// surface estimate.
-///
-/// A pixel's own estimate comes from the same few samples as its light: where they all missed, both are zero, and
-/// pixels that stop there would darken the picture (by 0.6 % on a white ball under an even sky, and by 22 % on rough
-/// metal beside a highlight, measured).
-fn pooled_variance(
-    shots: &[Option<Shot>],
-    shot: &Shot,
-    (x, y): (i64, i64),
-    (w, h): (i64, i64),
-) -> (f32, f32) {
-    let (mut camera, mut light, mut count) = (0.0, 0.0, 0.0);
-    for k in 0..9 {
-        let (nx, ny) = (x + k % 3 - 1, y + k / 3 - 1);
-        if nx < 0 || ny < 0 || nx >= w || ny >= h {
-            continue;
-        }
-        let Some(other) = &shots[(ny * w + nx) as usize] else { continue };
-        if k != 4 && !same_surface(&shot.key, &other.key) {
-            continue;
-        }
-        // As if the neighbour had been given the same effort.
-        let scale = |theirs: u32, ours: u32| theirs as f32 / ours.max(1) as f32;
-        camera += other.camera_variance * scale(other.effort.camera, shot.effort.camera);
-        light += other.light_variance * scale(other.effort.shadow, shot.effort.shadow);
-        count += 1.0;
+    /// The picture, with the noise that is estimated for each pixel, and the error that this amounts to.
+    fn film(&self) -> (Film, f32) {
+        let noise = effort::noise(&self.shots, self.view);
+        let (error, _) = effort::relative(&self.shots, &noise);
+        let pixel = |(shot, noise): (&Option<Shot>, &Noise)| {
+            let mut pixel = shot.as_ref().map(|s| s.pixel).unwrap_or_default();
+            pixel.variance += noise.camera + noise.light;
+            pixel
+        };
+        let pixels = self.shots.iter().zip(&noise).map(pixel).collect();
+        (Film::from_pixels(self.view.width, self.view.height, pixels), error)
     }
-    (camera / count, light / count)
-}
-
-/// The next rung: at least `least`, four times the last, at most `most`.
-fn more(now: u32, least: u32, most: u32) -> u32 {
-    (4 * now).max(least).min(most).max(now)
-}
-
-fn same_surface(a: &Option<Key>, b: &Option<Key>) -> bool {
-    match (a, b) {
-        (Some(a), Some(b)) => a.continues(b),
-        (None, None) => true,
-        _ => false,
-    }
-}
-
-/// Brightness of the picture that visible lamps cannot inflate: M of the error metric.
-fn level(shots: &[Option<Shot>]) -> f32 {
-    let mut y: Vec<f32> = shots.iter().flatten().map(|s| s.pixel.beauty().luminance()).collect();
-    if y.is_empty() {
-        return 0.0;
-    }
-    let k = (y.len() - 1) * 9 / 10;
-    let p90 = *y.select_nth_unstable_by(k, f32::total_cmp).1;
-    (y.iter().map(|&v| f64::from(v.min(p90))).sum::<f64>() / y.len() as f64) as f32
 }
 
 /// The path-traced picture, in passes, so that one that is stopped is whole and only noisier.

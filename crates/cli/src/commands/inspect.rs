@@ -3,19 +3,49 @@
 use super::print;
 use crate::args::InspectArgs;
 use crate::contents::{Contents, contents};
-use crate::load;
+use crate::{cameras, load};
 use anyhow::Result;
+use geometry::World;
+use geometry::gltf::Loaded;
+use raytrace::pixel::View;
+use raytrace::plan::Plan;
+use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
 use std::process::ExitCode;
 
 /// Runs the command.
 pub fn run(args: &InspectArgs) -> Result<ExitCode> {
     let loaded = load::scene(&args.scene, &args.which)?;
+    if args.plan {
+        return plan(args, loaded);
+    }
     let contents = contents(&args.scene, &loaded);
     print(&match args.json {
         true => serde_json::to_string_pretty(&contents)?,
         false => contents.to_string(),
     })?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What light each camera sees, and how it will be found.
+fn plan(args: &InspectArgs, loaded: Loaded) -> Result<ExitCode> {
+    let cameras = cameras::choose(Some("all"), &loaded.cameras, &loaded.scene)?.cameras;
+    let world = World::new(loaded.scene);
+    let mut plans = BTreeMap::new();
+    for camera in &cameras {
+        let aspect = camera.aspect.filter(|a| a.is_finite() && *a > 0.0).unwrap_or(1.0);
+        let view = View { camera, width: (512.0 * aspect) as u32 + 1, height: 512 };
+        plans.insert(&camera.name, Plan::new(&world, &view, args.error, 1));
+    }
+    if args.json {
+        let lines = |plan: &Plan| plan.to_string().lines().map(String::from).collect::<Vec<_>>();
+        let plans: BTreeMap<_, _> = plans.iter().map(|(name, plan)| (name, lines(plan))).collect();
+        print(&serde_json::to_string_pretty(&plans)?)?;
+    } else {
+        for (name, plan) in &plans {
+            print(&format!("Camera {name:?}, {} % asked:\n{plan}\n", 100.0 * args.error))?;
+        }
+    }
     Ok(ExitCode::SUCCESS)
 }
 

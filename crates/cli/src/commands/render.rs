@@ -1,4 +1,4 @@
-//! `twolight render`: a scene to an EXR, and a picture to look at.
+//! `twolight render`: a scene to an EXR, and a picture to look at; and whether it is as exact as it was asked to be.
 
 use super::print;
 use crate::args::RenderArgs;
@@ -8,12 +8,16 @@ use crate::{cameras, load};
 use anyhow::{Context, Result};
 use geometry::{Camera, Scene, World};
 use raytrace::exr::Metadata;
-use raytrace::{Integrator, Outcome, Progress, Settings, exr, prepass, render, tonemap};
+use raytrace::verify::{Judgement, Verdict};
+use raytrace::{Integrator, Outcome, Progress, Settings, exr, prepass_for, render, tonemap};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
+
+/// Exit status of a render whose pictures are written, but surely not as exact as asked.
+const MISSED: u8 = 3;
 
 /// Runs the command; failure if the user stopped it, though what there was is saved.
 pub fn run(args: RenderArgs) -> Result<ExitCode> {
@@ -51,7 +55,7 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
     shared.push(("build", lap(&mut clock)));
     let several = job.camera.as_deref() == Some("all");
     let mut pictures = Vec::new();
-    let (mut solution, mut rays_before) = (None, 0);
+    let (mut solution, mut rays_before, mut missed) = (None, 0, false);
     for camera in &choice.cameras {
         let path = |base: &Path| if several { with_name(base, &camera.name) } else { base.to_path_buf() };
         let (output, preview) = (path(&job.output), job.preview.as_deref().map(path));
@@ -59,13 +63,13 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
         if settings.integrator == Integrator::Hybrid && solution.is_none() {
             // Light does not know where we stand: one solution serves all views.
             solution = Some(
-                prepass(&world, &settings, &bars)
+                prepass_for(&world, &choice.cameras, &settings, &bars)
                     .with_context(|| format!("cannot solve {}", job.scene.display()))?,
             );
             shared.push(("prepass", lap(&mut clock)));
         }
         let mut outcome = render(&world, camera, solution.as_ref(), &settings, &bars)?;
-        outcome.report.stages.splice(0..0, shared.drain(..));
+        outcome.report.stages.extend(shared.drain(..));
         let rays = world.bvh.rays_cast();
         let rays = rays - std::mem::replace(&mut rays_before, rays);
         bars.done();
@@ -79,6 +83,10 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
             let message = "pixels were not finite or negative and are black instead; please report it";
             bars.note(&format!("warning: {} {message}", picture.repaired));
         }
+        if let Some(Accuracy { judgement: "missed", .. }) = picture.accuracy {
+            missed = true;
+            bars.note(&format!("warning: {} is not as exact as asked", picture.output.display()));
+        }
         if !job.json {
             print(&picture.line())?;
         }
@@ -91,7 +99,11 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
         let report = Report { scene: job.scene, warnings: loaded.warnings, pictures };
         print(&serde_json::to_string_pretty(&report)?)?;
     }
-    Ok(if bars.interrupted() { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+    Ok(match () {
+        () if bars.interrupted() => ExitCode::FAILURE,
+        () if missed => ExitCode::from(MISSED),
+        () => ExitCode::SUCCESS,
+    })
 }
 
 /// What `--json` prints.
@@ -116,7 +128,33 @@ struct Picture {
     stages: BTreeMap<&'static str, f64>,
     exposure: Option<f32>,
     repaired: u64,
+    accuracy: Option<Accuracy>,
     report: BTreeMap<String, String>,
+}
+
+/// How exact a picture is, in percent; `None` where it was not measured.
+#[derive(Serialize)]
+struct Accuracy {
+    asked: f64,
+    measured: f64,
+    /// Ends of the interval that holds the error with 95 % confidence.
+    low: f64,
+    high: f64,
+    judgement: &'static str,
+    probes: usize,
+    paths: u64,
+}
+
+impl From<Verdict> for Accuracy {
+    fn from(v: Verdict) -> Accuracy {
+        let judgement = match v.judgement() {
+            Judgement::Met => "met",
+            Judgement::Open => "open",
+            Judgement::Missed => "missed",
+        };
+        let [asked, measured, low, high] = [v.asked, v.error, v.low, v.high].map(|e| 100.0 * e);
+        Accuracy { asked, measured, low, high, judgement, probes: v.probes, paths: v.paths }
+    }
 }
 
 impl Picture {
@@ -159,7 +197,7 @@ fn save(
     rays: u64,
 ) -> Result<Picture> {
     let started = Instant::now();
-    let Outcome { film, finished, report } = outcome;
+    let Outcome { film, finished, report, .. } = outcome;
     exr::write(&film, &metadata(camera, settings, finished, &report.texts), &output)?;
     let mut exposure = None;
     if let Some(path) = &preview {
@@ -168,7 +206,10 @@ fn save(
         tonemap::write_png(film.width, film.height, &tonemap::to_srgb(&beauty, ev), path)?;
         exposure = Some(ev);
     }
-    let mut stages: BTreeMap<_, _> = report.stages.into_iter().collect();
+    let mut stages: BTreeMap<_, f64> = BTreeMap::new();
+    for (name, seconds) in report.stages {
+        *stages.entry(name).or_default() += seconds;
+    }
     stages.insert("write", started.elapsed().as_secs_f64());
     Ok(Picture {
         output,
@@ -182,6 +223,7 @@ fn save(
         stages,
         exposure,
         repaired: film.repaired,
+        accuracy: report.verdict.map(Accuracy::from),
         report: report.texts.into_iter().collect(),
     })
 }

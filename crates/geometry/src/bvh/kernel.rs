@@ -5,13 +5,16 @@ use super::prepared::Prepared;
 use super::simd::Avx2;
 use super::wide::Tree;
 use super::{Hit, Ray, portable};
+use std::ffi::OsStr;
+use std::sync::LazyLock;
 
-/// A way to traverse the tree. All give the same hits, bit for bit; they differ in speed.
+/// A way to traverse the tree. All test triangles by the same operations, so they give the same hits, bit for bit;
+/// they differ in speed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kernel {
     /// Plain Rust, on every machine.
     Portable,
-    /// Eight boxes and four triangles at once, on x86-64 with AVX2.
+    /// Eight boxes and four triangles at once, on x86-64 with AVX2 and FMA.
     Avx2,
 }
 
@@ -24,9 +27,22 @@ impl Kernel {
         Tracer::new(self).is_some()
     }
 
-    /// The fastest that this machine can run.
+    /// The fastest that this machine can run; the portable one where the environment says
+    /// `TWOLIGHT_KERNEL=portable`.
     pub fn best() -> Kernel {
-        Kernel::ALL.into_iter().rev().find(|k| k.is_available()).unwrap_or(Kernel::Portable)
+        static BEST: LazyLock<Kernel> =
+            LazyLock::new(|| Kernel::chosen(std::env::var_os("TWOLIGHT_KERNEL").as_deref()));
+        *BEST
+    }
+
+    /// The fastest, unless the portable one is wished for.
+    fn chosen(wish: Option<&OsStr>) -> Kernel {
+        let fastest = || Kernel::ALL.into_iter().rev().find(|k| k.is_available());
+        if wish.is_some_and(|w| w == "portable") {
+            Kernel::Portable
+        } else {
+            fastest().unwrap_or(Kernel::Portable)
+        }
     }
 }
 
@@ -68,5 +84,16 @@ impl Tracer {
             #[cfg(target_arch = "x86_64")]
             Tracer::Avx2(avx2) => avx2.occluded(tree, ray),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_portable_kernel_can_be_wished_for() {
+        assert_eq!(Kernel::chosen(Some(OsStr::new("portable"))), Kernel::Portable);
+        assert_eq!(Kernel::chosen(None) == Kernel::Avx2, Kernel::Avx2.is_available());
     }
 }

@@ -6,6 +6,10 @@ use super::Ray;
 /// reciprocal, multiply), and the triangle test's shear as many again.
 const WIDEN: f32 = 3.0 * f32::EPSILON;
 
+/// Components of a direction no larger than this count as zero where a reciprocal is needed, and a direction without
+/// a larger one is none: in a million metres the ray goes less than a millionth of an atom's width that way.
+pub(super) const LEAST: f32 = 1e-24;
+
 /// A ray, ready to be traced.
 pub(super) struct Prepared {
     /// Origin.
@@ -36,7 +40,7 @@ impl Prepared {
         let d = ray.direction;
         let z = d.abs().max_position();
         let scale = 1.0 / d[z];
-        let sane = ray.origin.is_finite() && d.is_finite() && scale.is_finite() && ray.t_min < ray.t_max;
+        let sane = ray.origin.is_finite() && d.is_finite() && d[z].abs() > LEAST && ray.t_min < ray.t_max;
         if !sane {
             return None;
         }

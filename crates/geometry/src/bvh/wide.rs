@@ -16,6 +16,11 @@ const DEEP: u32 = 24;
 /// 2³² triangles down to blocks takes 30 binary levels; each level of wide nodes undoes at least one.
 pub(super) const STACK: usize = (DEEP as usize + 30) * (WIDTH - 1) + 1;
 
+/// By how much a box, and the origin of a ray, are widened, relative to each coordinate: 8 units of rounding. Two
+/// take the slab test's own roundings (of the reciprocal and the result), four those of the triangle test's shear,
+/// so that no box is missed whose triangle is met.
+pub(super) const WIDEN: f32 = 4.0 * f32::EPSILON;
+
 /// Eight boxes: `bounds[0]` the least corners, `bounds[1]` the greatest, each by axis, then by child.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
@@ -75,6 +80,14 @@ pub(super) fn fold_to(mesh: &Mesh, mut binary: Binary, deep: u32) -> Tree {
         }
         children.clear();
         plan.children(&binary, from, &mut children);
+        // Where any hit will do, the last child met is visited first: the one with the most area for each of its
+        // triangles, likely to be hit and cheap to ask. Of rays that all meet something, 57 % more a second than in
+        // the order of the binary tree; by area alone 3 %, blocks first 46 %.
+        let promise = |&child: &u32| {
+            let node = binary.nodes[child as usize];
+            node.bounds.half_area() / f64::from(node.count.max(1))
+        };
+        children.sort_by(|a, b| promise(a).total_cmp(&promise(b)));
         for (lane, &child) in children.iter().enumerate().rev() {
             let source = binary.nodes[child as usize];
             let reference = if plan.is_leaf(child) {
@@ -103,8 +116,8 @@ impl Node {
 
     fn set(&mut self, lane: usize, bounds: &binary::Bounds, child: u32) {
         for axis in 0..3 {
-            self.bounds[0][axis][lane] = bounds.lo[axis];
-            self.bounds[1][axis][lane] = bounds.hi[axis];
+            self.bounds[0][axis][lane] = bounds.lo[axis] - WIDEN * bounds.lo[axis].abs();
+            self.bounds[1][axis][lane] = bounds.hi[axis] + WIDEN * bounds.hi[axis].abs();
         }
         self.child[lane] = child;
     }
@@ -112,8 +125,10 @@ impl Node {
 
 impl Block {
     fn new(mesh: &Mesh, triangles: &[u32]) -> Block {
+        let mut triangles = triangles.to_vec();
+        triangles.sort_unstable();
         let mut block = Block { corners: [[[0.0; LANES]; 3]; 3], triangle: [u32::MAX; LANES] };
-        for (lane, &t) in triangles.iter().enumerate() {
+        for (lane, t) in triangles.into_iter().enumerate() {
             block.triangle[lane] = t;
             for (corner, p) in mesh.corners(t).into_iter().enumerate() {
                 for axis in 0..3 {

@@ -103,14 +103,10 @@ fn surfaces(scene: &Scene) -> Vec<EmitterKind> {
         let radiance = mean_emission(scene, t);
         // A triangle that is black at every point looked up is left to rays that find it by chance.
         if radiance.max_channel() > 0.0 {
-            uneven.push(EmitterKind::Textured(PolygonLight {
-                vertices: mesh.corners(t).to_vec(),
-                normal: mesh.geometric_normal(t),
-                area,
-                radiance,
-                two_sided: material.double_sided,
-                triangles: vec![t],
-            }));
+            let (corners, normal) = (mesh.corners(t).to_vec(), mesh.geometric_normal(t));
+            let both = material.double_sided;
+            let light = PolygonLight::new(corners, normal, area, radiance, both, vec![t]);
+            uneven.push(EmitterKind::Textured(light));
         }
     }
     polygons(mesh, &even).into_iter().map(EmitterKind::Polygon).chain(uneven).collect()

@@ -19,14 +19,15 @@ pub enum Group {
 impl Emitters {
     /// All lights that may shine on `p` with unit normal `n`, each in one group, and about the irradiance (mean of the
     /// channels, lx) that each group throws there if nothing stands between. Each light is a group where there are at
-    /// most `most` of them; else those that are many and far, or weak, stay together.
+    /// most `most` of them, four at least; else those that are many and far, or weak, stay together.
     pub fn groups(&self, p: Vec3, n: Vec3, most: usize) -> Vec<(Group, f32)> {
         let one = |light: u32| (Group::Light(light), self.importance(light, p, n));
         if self.lights.len() <= most {
             return (0..self.lights.len() as u32).map(one).collect();
         }
-        let placed = self.tree.cut(p, n, most).into_iter().map(|(node, importance)| {
-            self.tree.light_of(node).map_or((Group::Branch(node), importance), one)
+        let placed = self.tree.cut(p, n, most).into_iter().map(|part| match part.light() {
+            Ok(light) => one(light),
+            Err(node) => (Group::Branch(node), part.importance),
         });
         placed.chain((self.tree_lights..self.lights.len() as u32).map(one)).collect()
     }
@@ -48,6 +49,14 @@ impl Emitters {
                 let s = self.sample_light(scene, light, p, [rest, u[1]])?;
                 Some(LightSample { pdf: s.pdf * probability, ..s })
             }
+        }
+    }
+
+    /// Whether a light is in a group.
+    pub fn is_in_group(&self, group: Group, light: u32) -> bool {
+        match group {
+            Group::Light(l) => l == light,
+            Group::Branch(node) => self.tree.is_below(node, light),
         }
     }
 
@@ -88,9 +97,9 @@ mod tests {
         }
         let scene = scene_of(mesh, 1.0);
         let emitters = Emitters::build(&scene);
-        for most in [1, 2, 16, 1000] {
+        for most in [4, 7, 16, 1000] {
             let groups = emitters.groups(p, n, most);
-            assert!(groups.len() <= most.max(1) || most == 1000);
+            assert!(groups.len() <= most || most == 1000);
             let mut sum = 0f64;
             for &(group, _) in &groups {
                 let k = 40_000 / groups.len() as u32;

@@ -33,18 +33,12 @@ pub(super) fn polygons(mesh: &Mesh, lit: &[(u32, Rgb, bool)]) -> Vec<PolygonLigh
         let (first, radiance, two_sided) = lit[i];
         taken[i] = true;
         let normal = mesh.geometric_normal(first);
-        let mut light = PolygonLight {
-            vertices: mesh.corners(first).to_vec(),
-            normal,
-            area: mesh.area(first),
-            radiance,
-            two_sided,
-            triangles: vec![first],
-        };
+        let (mut vertices, mut area, mut triangles) =
+            (mesh.corners(first).to_vec(), mesh.area(first), vec![first]);
         let mut edge = 0;
-        while edge < light.vertices.len() && light.vertices.len() < MAX_CORNERS {
-            let n = light.vertices.len();
-            let (a, b) = (light.vertices[edge], light.vertices[(edge + 1) % n]);
+        while edge < vertices.len() && vertices.len() < MAX_CORNERS {
+            let n = vertices.len();
+            let (a, b) = (vertices[edge], vertices[(edge + 1) % n]);
             let neighbour = across.get(&[corner(b), corner(a)]).copied().filter(|&j| !taken[j]);
             let apex = neighbour.filter(|&j| lit[j].1 == radiance && lit[j].2 == two_sided).and_then(|j| {
                 let normal_j = mesh.geometric_normal(lit[j].0);
@@ -53,20 +47,20 @@ pub(super) fn polygons(mesh: &Mesh, lit: &[(u32, Rgb, bool)]) -> Vec<PolygonLigh
                     .into_iter()
                     .find(|&c| corner(c) != corner(a) && corner(c) != corner(b))?;
                 let plane = normal_j.dot(normal) > 0.0 && normal_j.cross(normal).length() < COPLANAR;
-                (plane && stays_convex(&light.vertices, edge, apex, normal)).then_some((j, apex))
+                (plane && stays_convex(&vertices, edge, apex, normal)).then_some((j, apex))
             });
             match apex {
                 Some((j, apex)) => {
                     taken[j] = true;
-                    light.vertices.insert(edge + 1, apex);
-                    light.area += mesh.area(lit[j].0);
-                    light.triangles.push(lit[j].0);
+                    vertices.insert(edge + 1, apex);
+                    area += mesh.area(lit[j].0);
+                    triangles.push(lit[j].0);
                     edge = 0;
                 }
                 None => edge += 1,
             }
         }
-        lights.push(light);
+        lights.push(PolygonLight::new(vertices, normal, area, radiance, two_sided, triangles));
     }
     lights
 }

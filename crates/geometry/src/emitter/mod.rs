@@ -13,7 +13,7 @@ mod spherical;
 mod testing;
 mod tree;
 
-pub use area::PolygonLight;
+pub use area::{PolygonLight, Seen};
 pub use emit::Emission;
 pub use group::Group;
 pub use merge::MAX_CORNERS;
@@ -82,6 +82,16 @@ pub struct LightSample {
 }
 
 impl LightSample {
+    /// The same point of the light, drawn as seen from `p`, seen from `q` instead.
+    pub fn seen_from(&self, p: Vec3, q: Vec3) -> LightSample {
+        if !self.distance.is_finite() || p == q {
+            return *self;
+        }
+        let way = p + self.wi * self.distance - q;
+        let distance = way.length();
+        LightSample { wi: if distance > 0.0 { way / distance } else { self.wi }, distance, ..*self }
+    }
+
     /// From `p`, on a surface of unit geometric normal `ng` (zero in mid-air), to just before the light.
     pub fn shadow_ray(&self, p: Vec3, ng: Vec3) -> Ray {
         let side = if self.wi.dot(ng) < 0.0 { -ng } else { ng };
@@ -127,31 +137,72 @@ impl Emitters {
         &self.power
     }
 
+    /// One light as `p` sees it; `None` where a surface sends no light there.
+    #[inline]
+    pub fn seen_from(&self, light: u32, p: Vec3) -> Option<SeenLight<'_>> {
+        let kind = self.lights.get(light as usize)?;
+        let surface = match kind {
+            EmitterKind::Polygon(shape) | EmitterKind::Textured(shape) => Some(shape.seen_from(p)?),
+            _ => None,
+        };
+        Some(SeenLight { kind, light, p, surface })
+    }
+
     /// A way from `p` to one given light, the pdf without the probability of choosing that light; `u` in [0, 1)².
     /// `None` where it sends no light.
     pub fn sample_light(&self, scene: &Scene, light: u32, p: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        match self.lights.get(light as usize)? {
-            EmitterKind::Polygon(shape) => {
-                let (point, pdf) = shape.sample(p, u)?;
-                let way = point - p;
-                let distance = way.length();
-                let wi = way / distance;
-                Some(LightSample { wi, distance, radiance: shape.radiance, pdf, delta: false, light })
+        self.seen_from(light, p)?.sample(scene, u)
+    }
+
+    /// About the irradiance (mean of the channels, lx) that one light throws on `p` with unit normal `n` if nothing
+    /// stood between: exact for lamps, and for polygons unless they look small; the sky's mean for a sky. With a zero
+    /// `n` the surface faces the light.
+    pub fn importance(&self, light: u32, p: Vec3, n: Vec3) -> f32 {
+        let cos = |wi: Vec3| if n == Vec3::ZERO { 1.0 } else { wi.dot(n).max(0.0) };
+        match self.lights.get(light as usize) {
+            Some(EmitterKind::Polygon(shape) | EmitterKind::Textured(shape)) => shape.irradiance_about(p, n),
+            Some(EmitterKind::Punctual(lamp)) => {
+                lamp.reaching(p).map_or(0.0, |(wi, _, e)| e.mean() * cos(wi))
             }
-            EmitterKind::Textured(shape) => {
-                let (point, pdf) = shape.sample(p, u)?;
+            Some(EmitterKind::Sky(sky)) => PI * sky.mean().mean(),
+            None => 0.0,
+        }
+    }
+}
+
+/// One light as one point sees it: what all samples toward it share.
+#[derive(Clone, Debug)]
+pub struct SeenLight<'a> {
+    kind: &'a EmitterKind,
+    light: u32,
+    p: Vec3,
+    surface: Option<Seen<'a>>,
+}
+
+impl SeenLight<'_> {
+    /// A way to the light, the pdf without the probability of choosing it; `u` in [0, 1)². `None` where it sends none.
+    #[inline]
+    pub fn sample(&self, scene: &Scene, u: [f32; 2]) -> Option<LightSample> {
+        let SeenLight { light, p, .. } = *self;
+        match (self.kind, &self.surface) {
+            (EmitterKind::Polygon(shape) | EmitterKind::Textured(shape), Some(seen)) => {
+                let (point, pdf) = seen.sample(u)?;
                 let way = point - p;
                 let distance = way.length();
                 let wi = way / distance;
-                let hit = hit_at(scene, shape.triangles[0], point, distance);
-                let radiance = shone_at(scene, &hit, wi.dot(shape.normal) < 0.0);
+                let radiance = if let EmitterKind::Textured(_) = self.kind {
+                    let hit = hit_at(scene, shape.triangles[0], point, distance);
+                    shone_at(scene, &hit, wi.dot(shape.normal) < 0.0)
+                } else {
+                    shape.radiance
+                };
                 Some(LightSample { wi, distance, radiance, pdf, delta: false, light })
             }
-            EmitterKind::Punctual(lamp) => {
+            (EmitterKind::Punctual(lamp), _) => {
                 let (wi, distance, radiance) = lamp.reaching(p)?;
                 Some(LightSample { wi, distance, radiance, pdf: 1.0, delta: true, light })
             }
-            EmitterKind::Sky(sky) => {
+            (EmitterKind::Sky(sky), _) => {
                 let s = sky.sample(u);
                 let usable = s.pdf > 0.0 && s.pdf.is_finite();
                 usable.then_some(LightSample {
@@ -163,20 +214,7 @@ impl Emitters {
                     light,
                 })
             }
-        }
-    }
-
-    /// Irradiance (mean of the channels, lx) that one light throws on `p` with unit normal `n` if nothing stood
-    /// between: exact for polygons and lamps, the sky's mean for a sky. With a zero `n` the surface faces the light.
-    pub fn importance(&self, light: u32, p: Vec3, n: Vec3) -> f32 {
-        let cos = |wi: Vec3| if n == Vec3::ZERO { 1.0 } else { wi.dot(n).max(0.0) };
-        match self.lights.get(light as usize) {
-            Some(EmitterKind::Polygon(shape) | EmitterKind::Textured(shape)) => shape.irradiance(p, n).mean(),
-            Some(EmitterKind::Punctual(lamp)) => {
-                lamp.reaching(p).map_or(0.0, |(wi, _, e)| e.mean() * cos(wi))
-            }
-            Some(EmitterKind::Sky(sky)) => PI * sky.mean().mean(),
-            None => 0.0,
+            (EmitterKind::Polygon(_) | EmitterKind::Textured(_), None) => None,
         }
     }
 }

@@ -86,6 +86,7 @@ mod tests {
                 position: Vec3::new((i % 100) as f32, (i / 100) as f32, 0.0) * 0.01,
                 normal: Vec3::Z,
                 piece: 0,
+                face: 0,
             })
             .collect();
         let r = 0.1;

@@ -22,6 +22,11 @@ impl Node {
     pub fn is_leaf(&self) -> bool {
         self.child == 0
     }
+
+    /// Its two children, unless it is a leaf.
+    pub fn children(&self) -> Option<[u32; 2]> {
+        (!self.is_leaf()).then_some([self.child, self.child + 1])
+    }
 }
 
 /// The element mesh.
@@ -33,6 +38,10 @@ pub struct Elements {
     pub nodes: Vec<Node>,
     /// Number of pieces of connected surface.
     pub pieces: u32,
+    /// Number of faces.
+    pub faces: u32,
+    /// Number of scene triangles.
+    pub roots: u32,
 }
 
 /// Edges to split, with the midpoint each has got (or `VertexId::MAX` before it has).
@@ -105,7 +114,8 @@ impl Elements {
             })
             .collect();
         let pieces = welded.vertices.iter().map(|v| v.piece + 1).max().unwrap_or(0);
-        Elements { vertices: welded.vertices, nodes, pieces }
+        let faces = welded.vertices.iter().map(|v| v.face + 1).max().unwrap_or(0);
+        Elements { vertices: welded.vertices, nodes, pieces, faces, roots: mesh.triangles.len() as u32 }
     }
 
     /// Indices of the leaves, in order.
@@ -161,6 +171,17 @@ impl Elements {
         (v != VertexId::MAX).then(|| self.vertices[v as usize].piece)
     }
 
+    /// The face that scene triangle `t` belongs to; `None` for one without area.
+    pub fn face(&self, t: u32) -> Option<u32> {
+        let v = self.nodes[t as usize].vertices[0];
+        (v != VertexId::MAX).then(|| self.vertices[v as usize].face)
+    }
+
+    /// The face that a leaf belongs to.
+    pub fn face_of(&self, leaf: u32) -> u32 {
+        self.vertices[self.nodes[leaf as usize].vertices[0] as usize].face
+    }
+
     /// The piece of surface that a leaf belongs to.
     pub fn piece_of(&self, leaf: u32) -> usize {
         self.vertices[self.nodes[leaf as usize].vertices[0] as usize].piece as usize
@@ -168,9 +189,19 @@ impl Elements {
 
     /// The leaf that holds the point (u, v) of scene triangle `t`, with the weights of the leaf's three corners.
     pub fn locate(&self, t: u32, u: f32, v: f32) -> (u32, [f32; 3]) {
+        self.descend(t, u, v, |_| ())
+    }
+
+    /// Calls `visit` for every node that holds the point (u, v) of scene triangle `t`, from the root to the leaf.
+    pub fn visit_path(&self, t: u32, [u, v]: [f32; 2], visit: impl FnMut(u32)) {
+        self.descend(t, u, v, visit);
+    }
+
+    fn descend(&self, t: u32, u: f32, v: f32, mut visit: impl FnMut(u32)) -> (u32, [f32; 3]) {
         let mut at = t;
         let mut w = [(1.0 - u - v).max(0.0), u, v];
         loop {
+            visit(at);
             let node = &self.nodes[at as usize];
             if node.is_leaf() {
                 return (at, w);
@@ -221,7 +252,8 @@ impl Elements {
             let (a, b) = (self.vertices[p as usize], self.vertices[q as usize]);
             *entry = self.vertices.len() as VertexId;
             let normal = (a.normal + b.normal).normalize_or(a.normal);
-            self.vertices.push(Vertex { position: 0.5 * (a.position + b.position), normal, piece: a.piece });
+            let position = 0.5 * (a.position + b.position);
+            self.vertices.push(Vertex { position, normal, ..a });
         }
         *entry
     }

@@ -60,4 +60,7 @@ pub struct Vertex {
     pub normal: Vec3,
     /// Which connected piece of surface it belongs to; pieces touch where vertices share a place.
     pub piece: u32,
+    /// Which face of the piece: what hangs together without a crease. The six sides of a box are one piece, and light
+    /// may come to one of them only.
+    pub face: u32,
 }

@@ -46,19 +46,25 @@ pub(super) fn weld(mesh: &Mesh) -> Welded {
         let found = here.iter().copied().find(|&v| vertices[v as usize].normal.dot(normal) > COS_CREASE);
         of[i] = found.unwrap_or_else(|| {
             let v = vertices.len() as VertexId;
-            vertices.push(Vertex { position, normal, piece: p });
+            vertices.push(Vertex { position, normal, piece: p, face: v });
             place_of_vertex.push(p);
             here.push(v);
             v
         });
     }
-    number_pieces(mesh, &of, &place_of_vertex, at_place.len(), &mut vertices);
+    let pieces = numbered(mesh, &of, &place_of_vertex, at_place.len());
+    let each: Vec<u32> = (0..vertices.len() as u32).collect();
+    let faces = numbered(mesh, &of, &each, vertices.len());
+    for (vertex, (piece, face)) in vertices.iter_mut().zip(pieces.into_iter().zip(faces)) {
+        (vertex.piece, vertex.face) = (piece, face);
+    }
     Welded { vertices, of }
 }
 
-/// Union-find over places: triangles join the places of their corners.
-fn number_pieces(mesh: &Mesh, of: &[VertexId], place_of: &[u32], places: usize, vertices: &mut [Vertex]) {
-    let mut parent: Vec<u32> = (0..places as u32).collect();
+/// For every vertex the number of the connected set that it belongs to: triangles join the groups (`group_of`, fewer
+/// than `groups`) of their corners. Union-find.
+fn numbered(mesh: &Mesh, of: &[VertexId], group_of: &[u32], groups: usize) -> Vec<u32> {
+    let mut parent: Vec<u32> = (0..groups as u32).collect();
     fn root(parent: &mut [u32], mut i: u32) -> u32 {
         while parent[i as usize] != i {
             parent[i as usize] = parent[parent[i as usize] as usize];
@@ -71,20 +77,21 @@ fn number_pieces(mesh: &Mesh, of: &[VertexId], place_of: &[u32], places: usize, 
         if a == VertexId::MAX || b == VertexId::MAX || c == VertexId::MAX {
             continue;
         }
-        let [a, b, c] = [a, b, c].map(|v| root(&mut parent, place_of[v as usize]));
+        let [a, b, c] = [a, b, c].map(|v| root(&mut parent, group_of[v as usize]));
         let low = a.min(b).min(c);
         for i in [a, b, c] {
             parent[i as usize] = low;
         }
     }
-    let mut number = vec![u32::MAX; places];
+    let mut number = vec![u32::MAX; groups];
     let mut count = 0;
-    for (v, vertex) in vertices.iter_mut().enumerate() {
-        let r = root(&mut parent, place_of[v]) as usize;
+    let number_of = |&group: &u32| {
+        let r = root(&mut parent, group) as usize;
         if number[r] == u32::MAX {
             number[r] = count;
             count += 1;
         }
-        vertex.piece = number[r];
-    }
+        number[r]
+    };
+    group_of.iter().map(number_of).collect()
 }

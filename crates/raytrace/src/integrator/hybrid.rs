@@ -78,8 +78,8 @@ pub struct Diffuse {
     pub glossy: Rgb,
     /// All irradiance, lx.
     pub irradiance: Rgb,
-    /// Visible share of the unshadowed direct light.
-    pub visible: f32,
+    /// Of it, what comes straight from emitters by way of shadow rays.
+    pub straight: Rgb,
     /// Estimated variance of the luminance from shadow rays.
     pub variance: f32,
     /// The same from a gather.
@@ -90,7 +90,8 @@ impl Hybrid<'_> {
     /// The diffuse part of `surface`, and the lamps in its glossy lobes.
     ///
     /// - `phase`: see [`Spend`].
-    /// - `places`: points of the surface that caustics are averaged over, which may be finer than a pixel; at least one.
+    /// - `places`: points of the surface that caustics are averaged over, which may be finer than a pixel, and that shadow
+    ///   rays start from; at least one.
     pub fn diffuse(
         &self,
         surface: &Surface,
@@ -128,7 +129,15 @@ impl Hybrid<'_> {
         let lit = if from_vertices && gloss == Gloss::None {
             Direct { visible: 1.0, ..Direct::default() }
         } else if has_diffuse || gloss != Gloss::None {
-            direct(self.world, surface, wo, &plan, gloss, Spend { samples: quality.shadow, phase }, rng)
+            direct(
+                self.world,
+                surface,
+                wo,
+                &plan,
+                gloss,
+                Spend { samples: quality.shadow, phase, places },
+                rng,
+            )
         } else {
             Direct { visible: 1.0, ..Direct::default() }
         };
@@ -136,7 +145,7 @@ impl Hybrid<'_> {
             direct: lit.diffuse,
             glossy: lit.glossy,
             irradiance: lit.irradiance,
-            visible: lit.visible,
+            straight: lit.irradiance,
             variance: lit.variance,
             ..Diffuse::default()
         };
@@ -150,7 +159,7 @@ impl Hybrid<'_> {
         if from_vertices {
             let e = self.solution.direct(self.world, t, u, v, side);
             out.direct = photometry::reflected_radiance(albedo, e);
-            out.irradiance = e;
+            (out.irradiance, out.straight) = (e, Rgb::BLACK);
             out.variance = 0.0;
         }
         let gathers = match self.mode {

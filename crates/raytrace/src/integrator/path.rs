@@ -8,14 +8,17 @@
 //! found beyond is weighed by stays that of the last real one, and shadow rays pass the same panes.
 //!
 //! What it cannot find: light of point, spot and directional lamps by way of perfect mirrors or refraction, since no
-//! camera ray meets a lamp without extent.
+//! camera ray meets a lamp without extent. Probes that have photons of their own ([`Aid`]) find that too.
 
 use super::{Layers, Seen};
 use crate::film::Pixel;
+use geometry::bsdf::BsdfSample;
 use geometry::math::offset_origin;
 use geometry::optics::attenuation;
 use geometry::sampling::Rng;
-use geometry::{Camera, Ray, Rgb, Surface, Vec3, Volume, World};
+use geometry::{Camera, Ray, Rgb, Surface, Vec3, Volume, World, photometry};
+use radiosity::caustic::Caustics;
+use radiosity::gather::ROUGH;
 use std::f32::consts::PI;
 
 /// Scatterings after which a path ends whatever it carries. At ρ = 0.95 roulette leaves 2e-6 of the paths so long.
@@ -30,6 +33,22 @@ const ROULETTE_FROM: u32 = 5;
 /// Radiance that arrives along `ray`, one unbiased sample, and what the ray met first.
 pub fn radiance(world: &World, ray: Ray, rng: &mut Rng) -> (Layers, Option<Seen>) {
     Path::new(world, ray, true).trace(rng)
+}
+
+/// What makes a path less noisy, at the price of the photons' blur.
+#[derive(Clone, Copy, Debug)]
+pub struct Aid<'a> {
+    /// Light that comes to diffuse surfaces by way of mirrors and glass: paths leave it to these photons, for they
+    /// meet it seldom and then find it a thousand times too bright.
+    pub caustics: Option<&'a Caustics>,
+    /// The numbers in [0, 1) that choose the direction of the first scattering, stratified over the paths of a pixel.
+    pub first: [f32; 2],
+}
+
+/// As [`radiance`], all layers together, with some aid.
+pub fn aided_radiance(world: &World, ray: Ray, aid: Aid, rng: &mut Rng) -> Rgb {
+    let path = Path { first: Some(aid.first), caustics: aid.caustics, ..Path::new(world, ray, true) };
+    path.trace(rng).0.total()
 }
 
 /// Mean of `spp` paths through random points of pixel (x, y), from the top left; the filter is the pixel's box.
@@ -108,6 +127,31 @@ struct Path<'a> {
     bounces: u32,
     last: Option<Scattering>,
     medium: Option<Volume>,
+    /// See [`Aid`].
+    caustics: Option<&'a Caustics>,
+    first: Option<[f32; 2]>,
+    /// Specular scatterings since the last diffuse one, if there are photons.
+    chain: Option<Chain>,
+}
+
+/// Specular scatterings after a diffuse one.
+#[derive(Clone, Copy, Default)]
+struct Chain {
+    length: u32,
+    /// The first was rough enough to be lit by shadow rays.
+    rough: bool,
+}
+
+impl Chain {
+    /// Whether light found at its end is the photons' ([`radiosity::caustic`]).
+    fn is_the_photons(self) -> bool {
+        self.length > 1 || (self.length == 1 && !self.rough)
+    }
+
+    /// With one more scattering, at a surface that is rough or not.
+    fn longer(self, rough: bool) -> Chain {
+        Chain { length: self.length + 1, rough: if self.length == 0 { rough } else { self.rough } }
+    }
 }
 
 impl<'a> Path<'a> {
@@ -124,6 +168,9 @@ impl<'a> Path<'a> {
             bounces: 0,
             last: None,
             medium: None,
+            caustics: None,
+            first: None,
+            chain: None,
         }
     }
 
@@ -165,6 +212,9 @@ impl<'a> Path<'a> {
 
     /// Light found: to the layer that the path so far belongs to. `weight` by the share of other ways to find it.
     fn add(&mut self, radiance: Rgb, weight: f32) {
+        if self.chain.is_some_and(Chain::is_the_photons) {
+            return;
+        }
         let light = self.throughput * radiance * weight;
         match self.bounces {
             0 => self.layers.emission += light,
@@ -223,7 +273,11 @@ impl<'a> Path<'a> {
     fn scatter(&mut self, surface: &Surface, t: f32, rng: &mut Rng) -> Option<bool> {
         let bsdf = &surface.bsdf;
         let wo = -self.ray.direction;
-        let sample = bsdf.sample(wo, rng.array());
+        let mut u: [f32; 3] = rng.array();
+        if let Some(first) = self.first.take() {
+            [u[0], u[1]] = first;
+        }
+        let sample = bsdf.sample(wo, u);
         // A rough pane is lit from both sides, and so is what light comes through diffusely.
         let rough = !bsdf.is_delta();
         let preference = if (rough && !bsdf.layers.transmission(1.0).is_black()) || bsdf.is_translucent() {
@@ -238,6 +292,17 @@ impl<'a> Path<'a> {
         // Drawn whether the path goes straight on or not: the lobes that scatter are lit by every path alike.
         if self.light_sampling && (rough || bsdf.has_diffuse() || bsdf.is_translucent()) {
             self.next_event(surface, wo, preference, rng);
+        }
+        if let Some(caustics) = self.caustics
+            && bsdf.has_diffuse()
+        {
+            // A look-up takes as long as a path: a few of them do.
+            let chance = if self.bounces == 0 { 0.25 } else { 0.125 };
+            if rng.f32() < chance {
+                let e = caustics.irradiance(surface.position, surface.ng) / chance;
+                self.layers.indirect +=
+                    self.throughput * photometry::reflected_radiance(bsdf.diffuse_albedo(wo), e);
+            }
         }
         let s = sample?;
         self.throughput *= s.weight;
@@ -259,6 +324,9 @@ impl<'a> Path<'a> {
             }
             self.never_diffuse *= Rgb::WHITE - diffuse;
         }
+        if self.caustics.is_some() {
+            self.link(surface, wo, &s, rng);
+        }
         let side = if s.wi.dot(surface.ng) < 0.0 { -surface.ng } else { surface.ng };
         self.ray = Ray::new(offset_origin(surface.position, side), s.wi);
         let pdf = (!s.delta).then_some(s.pdf);
@@ -266,13 +334,35 @@ impl<'a> Path<'a> {
         Some(false)
     }
 
+    /// Notes whether the scattering was diffuse or one more of a specular chain: by chance where the direction may
+    /// have come of either, with weights that make up for it in each channel.
+    fn link(&mut self, surface: &Surface, wo: Vec3, s: &BsdfSample, rng: &mut Rng) {
+        let diffuse = match s.delta {
+            true => Rgb::BLACK,
+            false => share(surface.bsdf.eval_diffuse(wo, s.wi), surface.bsdf.eval(wo, s.wi)),
+        };
+        let chance = diffuse.luminance();
+        if rng.f32() < chance {
+            self.throughput *= diffuse * (1.0 / chance);
+            self.chain = Some(Chain::default());
+        } else {
+            self.throughput *= (Rgb::WHITE - diffuse) * (1.0 / (1.0 - chance));
+            let rough = surface.bsdf.glossy_roughness() >= ROUGH;
+            self.chain = self.chain.map(|chain| chain.longer(rough));
+        }
+    }
+
     /// One shadow ray.
     fn next_event(&mut self, surface: &Surface, wo: Vec3, preference: Vec3, rng: &mut Rng) {
         let World { scene, emitters, .. } = self.world;
         let u = rng.array();
         let Some(light) = emitters.sample(scene, surface.position, preference, u) else { return };
-        let (diffuse, glossy) =
+        let (diffuse, mut glossy) =
             (surface.bsdf.eval_diffuse(wo, light.wi), surface.bsdf.eval_glossy(wo, light.wi));
+        let rough = surface.bsdf.glossy_roughness() >= ROUGH;
+        if self.chain.is_some_and(|chain| chain.longer(rough).is_the_photons()) {
+            glossy = Rgb::BLACK;
+        }
         let f = diffuse + glossy;
         if f.is_black() {
             return;

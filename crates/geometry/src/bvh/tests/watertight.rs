@@ -6,7 +6,7 @@ use crate::Mesh;
 
 /// Rays that leave the mesh from points near `centre`, aimed at corners, at edges and inside triangles.
 fn escapes(mesh: &Mesh, centre: Vec3, spread: f32, rays: usize) -> [usize; 3] {
-    let bvh = Bvh::build(mesh);
+    let kernels = Kernel::ALL.map(|k| Bvh::build_for(mesh, k));
     let random = &mut Random(42);
     let mut escapes = [0; 3];
     for i in 0..rays {
@@ -17,8 +17,10 @@ fn escapes(mesh: &Mesh, centre: Vec3, spread: f32, rays: usize) -> [usize; 3] {
         let origin = if i % 2 == 0 { centre } else { centre + spread * random.cube() };
         for (target, escaped) in targets.into_iter().zip(&mut escapes) {
             let ray = Ray::new(origin, (target - origin).normalize());
-            *escaped += usize::from(bvh.closest_hit(&ray).is_none());
-            *escaped += usize::from(!bvh.occluded(&ray));
+            for bvh in &kernels {
+                *escaped += usize::from(bvh.closest_hit(&ray).is_none());
+                *escaped += usize::from(!bvh.occluded(&ray));
+            }
         }
     }
     escapes
