@@ -25,6 +25,9 @@ const LONGEST: usize = 10;
 /// A side is lit when one walk in so many comes to a lit place: fewer come through the cracks between a room's walls
 /// (0.65 % outside the measured Cornell box).
 const RARE: usize = 300;
+/// Light at less than this cosine does not count: a lamp let into a ceiling lies in the plane of the ceiling's outside, and
+/// shines on it by rounding alone.
+const GRAZING: f32 = 1e-4;
 /// An emitter shines on a side when it does on one point in so many of it.
 const SELDOM: usize = 50;
 
@@ -157,7 +160,7 @@ fn walk(world: &World, p: Vec3, n: Vec3, rng: &mut Rng) -> bool {
 /// Whether one light sample reaches `p` on the side of unit normal `n`.
 fn shone_on(world: &World, p: Vec3, n: Vec3, rng: &mut Rng) -> bool {
     world.emitters.sample(&world.scene, p, n, rng.array()).is_some_and(|light| {
-        light.wi.dot(n) > 0.0
+        light.wi.dot(n) > GRAZING
             && !light.radiance.is_black()
             && !world.transmittance(&light.shadow_ray(p, n)).is_black()
     })

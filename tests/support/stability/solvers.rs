@@ -16,7 +16,6 @@ use raytrace::{DiffuseMode, Settings};
 use std::f32::consts::PI;
 
 const LEAK: &str = "a patch that a wall cuts in two has one value for both sides of the wall";
-const AMBIENT: &str = "the ambient term spreads what is yet unshot evenly, also where no light can come; `--no-ambient` leaves it out";
 const COARSE: &str = "light from the mesh alone is as coarse as the mesh";
 
 /// A way to solve.
@@ -336,10 +335,7 @@ fn sheet(solver: Solver) -> Option<Measure> {
     let e = area_mean(&world, below, |t, u, v| {
         solution.irradiance(&world, t, u, v, Side::Front) + solution.direct(&world, t, u, v, Side::Front)
     });
-    match solver {
-        Solver::Gather | Solver::Matrix => Measure::new(e, 0.0),
-        _ => Measure::limit(e, 0.0, AMBIENT),
-    }
+    Measure::new(e, 0.0)
 }
 
 fn kept(solver: Solver) -> Option<Measure> {

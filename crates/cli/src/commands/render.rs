@@ -74,7 +74,7 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
             shared.push(("prepass", lap(&mut clock)));
         }
         let mut outcome = render(&world, camera, solution.as_ref(), &settings, &bars)?;
-        outcome.report.stages.extend(shared.drain(..));
+        outcome.report.stages.append(&mut shared);
         let rays = world.bvh.rays_cast();
         let rays = rays - std::mem::replace(&mut rays_before, rays);
         bars.done();
