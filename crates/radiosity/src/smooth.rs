@@ -218,9 +218,9 @@ mod tests {
             }
         }
         let first = first_row_of_inverse(m).expect("twenty scattered points fix a quadric");
-        for j in 0..TERMS {
-            let product: f64 = (0..TERMS).map(|i| first[i] * m[i][j]).sum();
-            assert!((product - if j == 0 { 1.0 } else { 0.0 }).abs() < 1e-9, "{j}: {product}");
+        for (j, want) in [1.0, 0.0, 0.0, 0.0, 0.0, 0.0].into_iter().enumerate() {
+            let product: f64 = first.iter().zip(&m).map(|(f, row)| f * row[j]).sum();
+            assert!((product - want).abs() < 1e-9, "{j}: {product}");
         }
         // All in one line: nothing tells the terms across it.
         assert!(first_row_of_inverse([[1.0; TERMS]; TERMS]).is_none());

@@ -184,7 +184,9 @@ impl Picture {
             line += "; unfinished";
         }
         for (name, value) in &self.report {
-            line += &format!("\n  {name}: {value}");
+            // Of several lines each is one of its own, indented alike.
+            let value = if value.contains('\n') { format!("\n{value}") } else { format!(" {value}") };
+            line += &format!("\n  {name}:{}", value.replace('\n', "\n    "));
         }
         line
     }
