@@ -103,7 +103,9 @@ impl Verdict {
 
 impl std::fmt::Display for Verdict {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let [error, low, high, asked] = [self.error, self.low, self.high, self.asked].map(|e| 100.0 * e);
+        let [error, low, high] = [self.error, self.low, self.high].map(|e| 100.0 * e);
+        // As it was typed: 2, not 1.9999999552965164.
+        let asked = (100.0 * self.asked) as f32;
         let word = match self.judgement() {
             Judgement::Met => "met",
             Judgement::Open => "not surely met",

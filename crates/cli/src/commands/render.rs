@@ -145,7 +145,7 @@ pub(super) struct Picture {
 /// How exact a picture is, in percent; `None` where it was not measured.
 #[derive(Serialize)]
 struct Accuracy {
-    asked: f64,
+    asked: f32,
     measured: f64,
     /// Ends of the interval that holds the error with 95 % confidence.
     low: f64,
@@ -162,8 +162,16 @@ impl From<Verdict> for Accuracy {
             Judgement::Open => "open",
             Judgement::Missed => "missed",
         };
-        let [asked, measured, low, high] = [v.asked, v.error, v.low, v.high].map(|e| 100.0 * e);
-        Accuracy { asked, measured, low, high, judgement, probes: v.probes, paths: v.paths }
+        let [measured, low, high] = [v.error, v.low, v.high].map(|e| 100.0 * e);
+        Accuracy {
+            asked: (100.0 * v.asked) as f32,
+            measured,
+            low,
+            high,
+            judgement,
+            probes: v.probes,
+            paths: v.paths,
+        }
     }
 }
 
