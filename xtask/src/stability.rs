@@ -118,7 +118,10 @@ pub fn html() -> String {
     let flush = |rows: &mut Vec<&str>, out: &mut String| {
         for (i, row) in rows.iter().enumerate().filter(|(_, row)| !row.starts_with("|---")) {
             let (open, close) = match i {
-                0 => ("<table>\n<thead><tr><th>", "</th></tr></thead>\n<tbody>"),
+                0 => (
+                    "<div class=\"scroll\" tabindex=\"0\" role=\"region\"><table>\n<thead><tr><th>",
+                    "</th></tr></thead>\n<tbody>",
+                ),
                 _ => ("<tr><td>", "</td></tr>"),
             };
             let between = if i == 0 { "</th><th>" } else { "</td><td>" };
@@ -126,7 +129,7 @@ pub fn html() -> String {
             *out += &format!("{open}{}{close}\n", cells.join(between));
         }
         if !rows.is_empty() {
-            *out += "</tbody></table>\n";
+            *out += "</tbody></table></div>\n";
         }
         rows.clear();
     };
