@@ -2,11 +2,17 @@
 //!
 //! Samples are independent and seeds fixed; z by the measured variance, |z| < 4.9, so one false alarm in a million each.
 
-use geometry::World;
+use geometry::sampling::Rng;
+use geometry::{Vec3, World};
+use radiosity::caustic::Caustics;
+use radiosity::element::Elements;
+use raytrace::integrator::path::{Aid, aided_radiance, radiance};
 use raytrace::{DiffuseMode, Film, Settings};
 use support::blocks::ALARM;
+use support::build::{Build, camera};
 use support::files::asset;
 use support::picture::{hybrid, path, shoot, shoot_with, solve};
+use support::stuff::{lamp, matt, metal};
 
 /// The variance layer of the reference is that of its pixels: squared differences of two independent pictures over the
 /// sum of their variances average 1. Over 24² pixels of 64 paths the average has a standard error of 6 % (√(2/576)), or
@@ -69,4 +75,48 @@ fn the_mean_over_seeds_is_that_of_paths() {
         assert!((average - exact).abs() < noise + 0.005 * exact, "{mode:?}: {average}, not {exact}");
         assert!(noise < 0.02 * exact, "the test finds 2.5 %: {noise} of {exact}");
     }
+}
+
+/// Probes leave light by way of mirrors to photons, and are to find the same as plain paths: a floor beside a mirror,
+/// under a lamp large enough for paths to meet. Leaving that light out, or counting it twice, would be off by its share.
+#[test]
+fn aided_paths_have_the_mean_of_plain_ones() {
+    let c = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
+    let mirror = [c(-1.0, 0.0, -1.0), c(-1.0, 0.0, 1.0), c(-1.0, 2.0, 1.0), c(-1.0, 2.0, -1.0)];
+    let world = Build::new()
+        .level(0.0, [-1.0, -1.0], [1.0, 1.0], true, &matt(0.5))
+        .level(2.0, [-0.6, -0.6], [0.6, 0.6], false, &lamp(10.0))
+        .quad(mirror, &metal(0.9, 0.0))
+        .world();
+    let caustics = Caustics::trace(&world, &Elements::new(&world.scene.mesh), 1_000_000, 1);
+    let eye = camera(c(-0.2, 1.0, 0.0), c(-0.2, 0.0, 0.001), 0.5);
+    let mean = |aided: bool| {
+        const PATHS: u32 = 200_000;
+        let (mut sum, mut square) = (0.0, 0.0);
+        for i in 0..PATHS {
+            let mut rng = Rng::new(7 + u64::from(aided), u64::from(i));
+            let ray = eye.ray(rng.f32(), rng.f32(), 1.0);
+            let light = match aided {
+                false => radiance(&world, ray, &mut rng).0.total(),
+                true => {
+                    let aid = Aid { caustics: Some(&caustics), first: rng.array() };
+                    aided_radiance(&world, ray, aid, &mut rng)
+                }
+            };
+            sum += f64::from(light.g);
+            square += f64::from(light.g).powi(2);
+        }
+        let n = f64::from(PATHS);
+        (sum / n, (square / n - (sum / n).powi(2)).max(0.0) / n)
+    };
+    let ((plain, v), (aided, w)) = (mean(false), mean(true));
+    let share = {
+        let e = caustics.irradiance(c(-0.2, 0.0, 0.0), Vec3::Y);
+        f64::from(0.5 * e.g / std::f32::consts::PI) / plain
+    };
+    println!("plain {plain}, aided {aided}, of which by the mirror {share}");
+    assert!(share > 0.1, "the test would find a tenth of the light: {share}");
+    // One estimate by 80 photons is too large by 1/80, of what the mirror brings.
+    let allowed = ALARM * (v + w).sqrt() + 0.02 * share * plain;
+    assert!((aided - plain).abs() < allowed && allowed < 0.02 * plain, "{aided}, not {plain}: {allowed}");
 }

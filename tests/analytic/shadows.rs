@@ -84,8 +84,8 @@ fn a_penumbra_is_as_wide_as_geometry_says() {
     let expected = 2.0 * half * (edge / (height - edge)) / pixel * 0.8; // from 10 to 90 %
     println!("penumbra: {partial} pixels of {expected}, worst {worst}");
     assert!((partial as f32 - expected).abs() <= 2.0, "{partial} pixels of {expected}");
-    // 0.5 % was asked for the whole picture, of which a quarter is penumbra: the rest has no noise at all.
-    assert!(worst < 0.03, "{worst}");
+    // 0.5 % was asked for, and neighbours that all see the same skip the rays that would find a sliver of lamp.
+    assert!(worst < 0.02, "{worst}");
 }
 
 /// Nothing leaks under a wall that stands on one floor: the camera's room has no opening to the lit one.

@@ -57,6 +57,9 @@ struct Stock {
 impl Stock {
     /// Samples at which one more of them removes `worth` of the picture's variance.
     fn optimum(&self, worth: f32) -> f32 {
+        if self.v <= 0.0 {
+            return self.n as f32; // nothing over nothing where `worth` is 0 as well
+        }
         let n = (self.power * self.v / (self.cost * worth)).powf(1.0 / (1.0 + self.power));
         n.clamp(self.n as f32, self.most as f32)
     }
@@ -273,4 +276,116 @@ fn level(shots: &[Option<Shot>]) -> f32 {
     let k = (y.len() - 1) * 9 / 10;
     let p90 = *y.select_nth_unstable_by(k, f32::total_cmp).1;
     (y.iter().map(|&v| f64::from(v.min(p90))).sum::<f64>() / y.len() as f64) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::Pixel;
+    use geometry::{Camera, Rgb, Vec3};
+
+    fn stock(v: f32, power: f32, cost: f32) -> Stock {
+        Stock { v, power, n: 1, most: 1 << 14, cost }
+    }
+
+    #[test]
+    fn the_optimum_gives_every_pixel_samples_of_equal_worth() {
+        // Of one more sample: power · v · n^-(power + 1) / cost.
+        for s in [stock(4.0, 1.0, 1.0), stock(1.0, 1.0, 1.0), stock(9.0, 1.5, 1.0), stock(2.0, 1.0, 8.0)] {
+            let n = s.optimum(1e-3);
+            let worth = s.power * s.v * n.powf(-1.0 - s.power) / s.cost;
+            assert!((worth / 1e-3 - 1.0).abs() < 1e-3, "{n} samples: {worth}");
+        }
+        // Four times the variance, twice the samples.
+        let ratio = stock(4.0, 1.0, 1.0).optimum(1e-3) / stock(1.0, 1.0, 1.0).optimum(1e-3);
+        assert!((ratio - 2.0).abs() < 1e-3, "{ratio}");
+    }
+
+    #[test]
+    fn rungs_are_powers_of_four_within_a_leap() {
+        let s = Stock { n: 4, most: 256, ..stock(1e9, 1.0, 1.0) };
+        assert_eq!((s.next(1e-6, 0.0), s.next(1e-6, 0.99)), (64, 64), "16 times 4");
+        assert_eq!(Stock { n: 64, ..s }.next(1e-6, 0.0), 256, "no more than allowed");
+        assert_eq!(stock(1e-9, 1.0, 1.0).next(1.0, 0.99), 1, "no less than there is");
+        // An optimum of 8 is as likely 4 as 16.
+        let eight = stock(64.0, 1.0, 1.0);
+        assert_eq!((eight.next(1.0, 0.49), eight.next(1.0, 0.51)), (4, 16));
+    }
+
+    /// A picture of one surface whose direct light is `lit(x, y)`, 64 × 64.
+    fn shots(lit: impl Fn(u32, u32) -> f32) -> Vec<Option<Shot>> {
+        let shot = |i: u32| {
+            let lit = lit(i % 64, i / 64);
+            let pixel = Pixel { direct: Rgb::splat(0.25 * lit), samples: 1, ..Pixel::default() };
+            let effort = Effort { camera: 1, shadow: 4 };
+            Some(Shot {
+                pixel,
+                effort,
+                key: None,
+                lit,
+                sent: 0.25,
+                camera_variance: 0.0,
+                light_variance: 0.0,
+                specular: false,
+            })
+        };
+        (0..64 * 64).map(shot).collect()
+    }
+
+    fn mean_light_noise(shots: &[Option<Shot>]) -> f64 {
+        let camera = Camera::framing(Vec3::ZERO, Vec3::ONE);
+        let noise = noise(shots, &View { camera: &camera, width: 64, height: 64 });
+        // The rim has no eight neighbours.
+        let inner = (0..noise.len()).filter(|i| (2..62).contains(&(i % 64)) && (2..62).contains(&(i / 64)));
+        inner.map(|i| f64::from(noise[i].light)).sum::<f64>() / 3600.0
+    }
+
+    #[test]
+    fn noise_is_read_off_the_neighbours_whatever_the_light_does_along_rows_and_columns() {
+        let curve = |x: u32, y: u32| {
+            let (x, y) = (x as f32 / 64.0, y as f32 / 64.0);
+            3.0 + 2.0 * x + x * x + (4.0 * y).sin()
+        };
+        // Even of rounding there is little: (3 · 4 · 2^-23)² over 36, and sent² with it.
+        assert!(mean_light_noise(&shots(curve)) < 1e-12);
+        let mut rng = Rng::new(1, 2);
+        let grain: Vec<f32> = (0..64 * 64).map(|_| rng.f32() - 0.5).collect();
+        let noisy = shots(|x, y| curve(x, y) + 0.2 * grain[(64 * y + x) as usize]);
+        // A uniform number of width 0.2 has a variance of 0.04/12; the kernel's overlap leaves of 3600 squares the worth
+        // of some 500: one standard deviation is √(2/500) = 6 %.
+        let expected = 0.04 / 12.0 * 0.25 * 0.25;
+        let found = mean_light_noise(&noisy);
+        assert!((found / expected - 1.0).abs() < 4.9 * 0.06, "{found}, not {expected}");
+    }
+
+    #[test]
+    fn what_is_hopeless_is_not_made_up_for_elsewhere() {
+        let mut shots = shots(|_, _| 3.0);
+        // A lamp's edge in each tenth pixel that may have no more rays, and a little noise of shadows everywhere.
+        for (i, shot) in shots.iter_mut().enumerate() {
+            let shot = shot.as_mut().expect("all are there");
+            shot.light_variance = if i % 2 == 0 { 1e-6 } else { 0.0 };
+            shot.camera_variance = if i % 10 == 0 { 1.0 } else { 0.0 };
+        }
+        let camera = Camera::framing(Vec3::ZERO, Vec3::ONE);
+        let noise = noise(&shots, &View { camera: &camera, width: 64, height: 64 });
+        let budget = Budget { goal: 0.01, most_camera: 1, most_shadow: 1 << 14 };
+        assert!(relative(&shots, &noise).0 > 0.1);
+        assert!(next(&shots, &noise, &budget).is_empty());
+    }
+
+    #[test]
+    fn a_picture_within_its_budget_is_left_alone() {
+        let mut rng = Rng::new(1, 2);
+        let grain: Vec<f32> = (0..64 * 64).map(|_| rng.f32() - 0.5).collect();
+        let shots = shots(|x, y| 3.0 + 0.2 * grain[(64 * y + x) as usize]);
+        let camera = Camera::framing(Vec3::ZERO, Vec3::ONE);
+        let noise = noise(&shots, &View { camera: &camera, width: 64, height: 64 });
+        let (error, _) = relative(&shots, &noise);
+        let budget = |goal| Budget { goal, most_camera: 1, most_shadow: 1 << 14 };
+        assert!(next(&shots, &noise, &budget(error)).is_empty());
+        let more = next(&shots, &noise, &budget(0.25 * error));
+        // A sixteenth of the variance takes sixteen times as many shadow rays: nearly all pixels want more.
+        assert!(more.len() > 3000 && more.iter().all(|(_, e)| e.shadow > 4), "{}", more.len());
+    }
 }

@@ -4,6 +4,8 @@ use crate::film::Pixel;
 use crate::integrator::hybrid::{Hybrid, Photons, Quality};
 use geometry::sampling::Rng;
 use geometry::{Camera, MaterialId, Projection, Ray, Rgb, Surface, Vec3, World};
+use radiosity::Progress;
+use rayon::prelude::*;
 
 /// A camera with a film behind it.
 #[derive(Clone, Copy, Debug)]
@@ -144,6 +146,23 @@ pub fn shade(hybrid: &Hybrid, view: &View, x: u32, y: u32, effort: Effort, seed:
     // An edge through a jittered grid of n: the share of one side has variance ∝ n^-1.5.
     shot.camera_variance += spread * share.powf(1.5);
     shot
+}
+
+/// Calls `pixel` for every index of `which`, in parallel, until stopped; pixels not reached are `None`.
+pub(crate) fn over_pixels<T: Send>(
+    which: &[u32],
+    progress: &dyn Progress,
+    pixel: impl Fn(u32) -> T + Sync,
+) -> Vec<Option<T>> {
+    let run = |chunk: &[u32]| -> Vec<Option<T>> {
+        if progress.stopped() {
+            return chunk.iter().map(|_| None).collect();
+        }
+        let done = chunk.iter().map(|&i| Some(pixel(i))).collect();
+        progress.advance(chunk.len() as u64);
+        done
+    };
+    which.par_chunks(256).flat_map_iter(run).collect()
 }
 
 /// Place of a pixel in the 4 × 4 pattern whose members are spread as evenly as Bayer's matrix does, turned on by a

@@ -1,22 +1,22 @@
 //! The two passes, until the picture is what was asked for: pixels over threads, and again where probes find fault.
 //!
 //! Every pixel is a function of (seed, place, effort) alone, so the picture does not depend on threads. A first pass
-//! gives every pixel one ray; then those where it brings most are done again with more ([`effort`]). Probes that never
+//! gives every pixel one ray; then those where it brings most are done again with more ([`crate::effort`]). Probes that never
 //! see the solution say how exact the picture is ([`crate::verify`]); if it surely is not what was asked, samples or
 //! mesh become finer, by as much as was missing.
 
-use crate::effort::{self, Budget, Noise};
+use crate::adaptive::Adaptive;
+use crate::effort::Budget;
 use crate::film::{Film, Pixel};
 use crate::importance::importance;
 use crate::integrator::hybrid::Hybrid;
 use crate::integrator::path;
-use crate::pixel::{Effort, Shot, View, shade};
+use crate::pixel::{View, over_pixels};
 use crate::plan::Plan;
 use crate::verify::{Judgement, Probes, Verdict};
 use geometry::sampling::Lattice2;
 use geometry::{Camera, World};
 use radiosity::{Config, Solution, classical};
-use rayon::prelude::*;
 use std::time::Instant;
 
 pub use radiosity::Progress;
@@ -75,12 +75,8 @@ pub struct Settings {
 const NOISE_SHARE: f32 = 0.5;
 /// What the first pass is asked for, in units of the error asked.
 const MESH_SHARE: f32 = 0.85;
-/// Every pixel's first effort.
-const FIRST: Effort = Effort { camera: 1, shadow: 4 };
 /// Rays through one pixel, and shadow rays for one surface, at most: the edge of a lamp before a dark wall wants many.
 pub(crate) const MOST_SAMPLES: u32 = 16_384;
-/// Rounds of refinement at most.
-const MOST_ROUNDS: u32 = 6;
 /// Times at most that a picture which missed the error asked is made better.
 const MOST_REPAIRS: u32 = 2;
 /// An error is missed by so much more than it seems, for the next step is not known exactly.
@@ -217,13 +213,16 @@ fn two_passes(
     }
     let plan = Plan::new(world, view, settings.error, settings.seed);
     clock.lap("plan");
+    // Classical meshes know no error, and who sets the number of rays gets that number.
+    let fixed = settings.classical.is_some() || settings.samples.is_some() || settings.gather_rays.is_some();
+    let most_repairs = if fixed { 0 } else { MOST_REPAIRS };
     let (mut probes, mut repairs) = (None, 0);
     loop {
         let solution = made.as_ref().or(solution).expect("given or made");
         let rays = ((256.0 * (0.02 / mesh_error)) as u32).clamp(64, 1024);
         let hybrid = Hybrid { world, solution, mode: settings.diffuse, pattern: Lattice2::new(rays) };
         let before = world.bvh.rays_cast();
-        let mut picture = Adaptive { hybrid: &hybrid, view, seed: settings.seed, shots: Vec::new() };
+        let mut picture = Adaptive::new(&hybrid, view, settings.seed);
         let mut finished = picture.start(watch);
         let finer_mesh = loop {
             finished = finished && picture.refine(&budget(settings, noise_error), watch);
@@ -240,10 +239,8 @@ fn two_passes(
                 clock.lap("verify");
             }
             // A classical method is shown as it is: what was asked of it are its patches.
-            let missed =
-                verdict.filter(|v| v.judgement() == Judgement::Missed && settings.classical.is_none());
-            if let Some(verdict) = missed
-                && repairs < MOST_REPAIRS
+            if let Some(verdict) = verdict.filter(|v| v.judgement() == Judgement::Missed)
+                && repairs < most_repairs
                 && watch.has_time_for(clock.total())
             {
                 repairs += 1;
@@ -303,11 +300,9 @@ pub(crate) fn noise_goal(error: f32) -> f32 {
 
 /// What samples may leave as noise.
 fn budget(settings: &Settings, goal: f32) -> Budget {
-    Budget {
-        goal,
-        most_camera: settings.samples.map_or(MOST_SAMPLES, |n| n.max(1)),
-        most_shadow: MOST_SAMPLES,
-    }
+    // Rays through a pixel fill a square grid: of 10 that are allowed it takes 4.
+    let most_camera = settings.samples.map_or(MOST_SAMPLES, |n| 4u32.pow(n.max(1).ilog(4)));
+    Budget { goal, most_camera, most_shadow: MOST_SAMPLES }
 }
 
 /// What the prepass found, for the file and the user.
@@ -332,82 +327,6 @@ fn facts(r: &radiosity::Report) -> Vec<(String, String)> {
         facts.push(("caustics", format!("{} photons, {:.4} lm", r.photons, r.caustic_flux.luminance())));
     }
     facts.into_iter().map(|(name, value)| (name.to_string(), value)).collect()
-}
-
-/// Calls `pixel` for every index of `which`, in parallel, until stopped; pixels not reached are `None`.
-fn over_pixels<T: Send>(which: &[u32], watch: &Watch, pixel: impl Fn(u32) -> T + Sync) -> Vec<Option<T>> {
-    let run = |chunk: &[u32]| -> Vec<Option<T>> {
-        if watch.stopped() {
-            return chunk.iter().map(|_| None).collect();
-        }
-        let done = chunk.iter().map(|&i| Some(pixel(i))).collect();
-        watch.advance(chunk.len() as u64);
-        done
-    };
-    which.par_chunks(256).flat_map_iter(run).collect()
-}
-
-/// The adaptive picture.
-struct Adaptive<'a> {
-    hybrid: &'a Hybrid<'a>,
-    view: &'a View<'a>,
-    seed: u64,
-    shots: Vec<Option<Shot>>,
-}
-
-impl Adaptive<'_> {
-    /// One ray through every pixel; whether all were reached.
-    fn start(&mut self, watch: &Watch) -> bool {
-        let pixels = self.view.width * self.view.height;
-        watch.stage("image", u64::from(pixels));
-        let everywhere: Vec<u32> = (0..pixels).collect();
-        self.shots = over_pixels(&everywhere, watch, |i| self.shade(i, FIRST));
-        self.shots.iter().all(Option::is_some)
-    }
-
-    /// Does those pixels again that need it, until the noise is within `budget`; whether it came to that.
-    fn refine(&mut self, budget: &Budget, watch: &Watch) -> bool {
-        for _ in 0..MOST_ROUNDS {
-            let noise = effort::noise(&self.shots, self.view);
-            let wanted = effort::next(&self.shots, &noise, budget);
-            if wanted.is_empty() {
-                return true;
-            }
-            watch.stage("refining", wanted.len() as u64);
-            let which: Vec<u32> = (0..wanted.len() as u32).collect();
-            let again = over_pixels(&which, watch, |k| {
-                let (i, effort) = wanted[k as usize];
-                self.shade(i, effort)
-            });
-            let finished = again.iter().all(Option::is_some);
-            for (&(i, _), shot) in wanted.iter().zip(again) {
-                if shot.is_some() {
-                    self.shots[i as usize] = shot;
-                }
-            }
-            if !finished {
-                return false;
-            }
-        }
-        true
-    }
-
-    fn shade(&self, i: u32, effort: Effort) -> Shot {
-        shade(self.hybrid, self.view, i % self.view.width, i / self.view.width, effort, self.seed)
-    }
-
-    /// The picture, with the noise that is estimated for each pixel, and the error that this amounts to.
-    fn film(&self) -> (Film, f32) {
-        let noise = effort::noise(&self.shots, self.view);
-        let (error, _) = effort::relative(&self.shots, &noise);
-        let pixel = |(shot, noise): (&Option<Shot>, &Noise)| {
-            let mut pixel = shot.as_ref().map(|s| s.pixel).unwrap_or_default();
-            pixel.variance += noise.camera + noise.light;
-            pixel
-        };
-        let pixels = self.shots.iter().zip(&noise).map(pixel).collect();
-        (Film::from_pixels(self.view.width, self.view.height, pixels), error)
-    }
 }
 
 /// The path-traced picture, in passes, so that one that is stopped is whole and only noisier.

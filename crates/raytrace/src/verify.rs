@@ -278,12 +278,13 @@ impl Weights {
         Weights { floor: (0.01 * metrics::brightness(&film.beauty()).powi(2)).max(f64::MIN_POSITIVE) }
     }
 
-    /// mean_c truth² + 0.01 M², the truth taken as what the film says, or where the paths say otherwise beyond two
-    /// standard errors, as the nearest that they allow: a firefly must not excuse itself.
+    /// mean_c truth² + 0.01 M², the truth taken as what the film says, or where the paths say otherwise beyond five
+    /// standard errors, as the nearest that they allow: a firefly must not excuse itself. Of four batches two standard
+    /// errors would be too few: those that missed the light know nothing of it, and made errors look a third larger.
     fn of(&self, film: &Film, p: &Probe) -> f64 {
         let out = film.pixels[p.pixel].beauty().to_array();
         let square = |c: usize| {
-            let doubt = 2.0 * p.noise[c].sqrt();
+            let doubt = 5.0 * p.noise[c].sqrt();
             f64::from(out[c]).clamp(p.mean[c] - doubt, p.mean[c] + doubt).powi(2)
         };
         (0..3).map(square).sum::<f64>() / 3.0 + self.floor

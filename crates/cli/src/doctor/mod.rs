@@ -11,6 +11,7 @@ mod rooms;
 use geometry::gltf::Loaded;
 use geometry::{Mesh, World};
 use serde::Serialize;
+use std::collections::HashMap;
 
 /// Something that is wrong, or probably so.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -56,22 +57,24 @@ pub fn examine(loaded: &Loaded) -> Vec<Finding> {
 
 /// Of each kind the first few, and how many more there are.
 fn shorten(found: Vec<Finding>) -> Vec<Finding> {
-    let mut out: Vec<Finding> = Vec::new();
+    let kind = |f: &Finding| (f.kind, f.remedy);
+    let mut all: HashMap<_, usize> = HashMap::new();
+    for finding in &found {
+        *all.entry(kind(finding)).or_default() += 1;
+    }
+    let mut seen: HashMap<_, usize> = HashMap::new();
+    let mut out = Vec::new();
     for finding in found {
-        let of_kind = |f: &&Finding| f.kind == finding.kind && f.remedy == finding.remedy;
-        match out.iter().filter(of_kind).count() {
+        let before = seen.entry(kind(&finding)).or_default();
+        match *before {
             n if n < SHOWN => out.push(finding),
             n if n == SHOWN => {
-                out.push(Finding { place: "…".into(), problem: "and 1 more".into(), ..finding })
+                let problem = format!("and {} more", all[&kind(&finding)] - SHOWN);
+                out.push(Finding { place: "…".into(), problem, ..finding });
             }
-            _ => {
-                let last =
-                    out.iter_mut().rev().find(|f| f.kind == finding.kind && f.remedy == finding.remedy);
-                let Some(last) = last else { continue };
-                let more = last.problem.split(' ').nth(1).and_then(|n| n.parse::<usize>().ok()).unwrap_or(1);
-                last.problem = format!("and {} more", more + 1);
-            }
+            _ => {}
         }
+        *before += 1;
     }
     out
 }

@@ -82,6 +82,28 @@ fn json_describes_the_picture() {
 }
 
 #[test]
+fn a_picture_that_missed_its_error_is_written_and_says_so() {
+    let dir = folder();
+    // One ray through a pixel leaves every edge as it falls: far from 5 %.
+    let cornell = cornell();
+    let args = ["render", &cornell, "-o", "a.exr", "--size", "48x48", "--error", "5%", "--samples", "1"];
+    let run = twolight(dir.path(), &[&args[..], &["--json"]].concat());
+    assert_eq!(run.status, 3, "{}", run.err);
+    assert!(run.err.contains("not as exact as asked"), "{}", run.err);
+    let json: serde_json::Value = serde_json::from_str(&run.out).expect("stdout is JSON and nothing else");
+    let accuracy = &json["pictures"][0]["accuracy"];
+    let number = |name: &str| accuracy[name].as_f64().expect("it is a number");
+    assert!(number("asked") == 5.0 && number("low") > 5.0, "{accuracy}");
+    assert!(number("measured") > number("low") && number("measured") < number("high"), "{accuracy}");
+    assert_eq!(accuracy["judgement"], "missed");
+    let bytes = fs::read(dir.path().join("a.exr")).expect("it was written");
+    assert!(bytes.windows(23).any(|w| w == b"twolight:error measured"));
+    // Unasked it is not judged.
+    let run = twolight(dir.path(), &[&args[..], &["--no-verify"]].concat());
+    assert_eq!(run.status, 0, "{}", run.err);
+}
+
+#[test]
 fn no_time_gives_a_picture_that_says_so_or_leaves_the_old_one() {
     let dir = folder();
     fs::write(dir.path().join("a.exr"), "precious").expect("it can be written");

@@ -271,7 +271,9 @@ fn prepare<const ANY: bool>(ray: &Ray) -> Option<(Slabs, Shear)> {
     let most = _mm_max_ps(most, _mm_shuffle_ps::<0b11_01_00_10>(size, size));
     let finite = _mm_cmpeq_ps(_mm_fmadd_ps(o, zero, _mm_mul_ps(d, zero)), zero);
     let most = _mm_cvtss_f32(most);
-    if _mm_movemask_ps(finite) != 15 || most <= LEAST || ray.t_max <= ray.t_min {
+    // False for an end that is not a number, too.
+    let runs = ray.t_min < ray.t_max;
+    if _mm_movemask_ps(finite) != 15 || most <= LEAST || !runs {
         return None;
     }
     let z = (_mm_movemask_ps(_mm_cmpeq_ps(size, _mm_set1_ps(most))) as u32).trailing_zeros() as usize;

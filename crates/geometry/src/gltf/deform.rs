@@ -25,6 +25,37 @@ pub(super) struct Deform {
     pub joints: Option<Vec<DAffine3>>,
 }
 
+/// What a primitive was decoded from.
+pub(super) struct Attributes<'a> {
+    pub document: &'a Document,
+    pub json: &'a json::mesh::Primitive,
+    /// Its path in the file.
+    pub at: &'a str,
+    /// Which element of the attributes each of its vertices is.
+    pub source: &'a [u32],
+    /// Elements of each attribute.
+    pub vertices: usize,
+}
+
+impl Attributes<'_> {
+    /// The accessor called `name` below the primitive's path, of one element for each of POSITION.
+    fn open(
+        &self,
+        index: json::Index<json::Accessor>,
+        name: &str,
+        kind: Type,
+        components: &[ComponentType],
+    ) -> Result<Accessor<'_>, Error> {
+        let user = format!("{}.{name}", self.at);
+        let accessor = Accessor::open(self.document, index, &user, &[kind], components)?;
+        if accessor.len() != self.vertices {
+            let problem = format!("POSITION has {}", self.vertices);
+            return Err(self.document.fault(format!("{user}.count"), accessor.len(), problem));
+        }
+        Ok(accessor)
+    }
+}
+
 impl Deform {
     /// What node `i` does to its mesh; `None` where it leaves it as it is.
     ///
@@ -54,33 +85,17 @@ impl Deform {
         Ok(bends.then_some(Deform { weights, joints }))
     }
 
-    /// Bends `out`, vertex k of which is element `source[k]` of the file's attributes.
-    pub fn apply(
-        &self,
-        document: &Document,
-        json: &json::mesh::Primitive,
-        at: &str,
-        source: &[u32],
-        vertices: usize,
-        out: &mut Primitive,
-    ) -> Result<(), Error> {
-        self.morph(document, json, at, source, vertices, out)?;
+    /// Bends `out`, which was decoded from `file`.
+    pub fn apply(&self, file: &Attributes, out: &mut Primitive) -> Result<(), Error> {
+        self.morph(file, out)?;
         match &self.joints {
-            Some(joints) => skin(document, json, at, source, vertices, joints, out),
+            Some(joints) => skin(file, joints, out),
             None => Ok(()),
         }
     }
 
-    fn morph(
-        &self,
-        document: &Document,
-        json: &json::mesh::Primitive,
-        at: &str,
-        source: &[u32],
-        vertices: usize,
-        out: &mut Primitive,
-    ) -> Result<(), Error> {
-        let targets = json.targets.as_deref().unwrap_or_default();
+    fn morph(&self, file: &Attributes, out: &mut Primitive) -> Result<(), Error> {
+        let targets = file.json.targets.as_deref().unwrap_or_default();
         let numbers = [ComponentType::F32, ComponentType::I8, ComponentType::I16];
         for (t, (target, &weight)) in targets.iter().zip(&self.weights).enumerate() {
             if weight == 0.0 {
@@ -88,13 +103,8 @@ impl Deform {
             }
             let add = |index: Option<json::Index<json::Accessor>>, to: &mut [Vec3], name: &str| {
                 let Some(index) = index.filter(|_| !to.is_empty()) else { return Ok(()) };
-                let user = format!("{at}.targets[{t}].{name}");
-                let accessor = Accessor::open(document, index, &user, &[Type::Vec3], &numbers)?;
-                if accessor.len() != vertices {
-                    let problem = format!("POSITION has {vertices}");
-                    return Err(document.fault(format!("{user}.count"), accessor.len(), problem));
-                }
-                for (v, &i) in to.iter_mut().zip(source) {
+                let accessor = file.open(index, &format!("targets[{t}].{name}"), Type::Vec3, &numbers)?;
+                for (v, &i) in to.iter_mut().zip(file.source) {
                     *v += Vec3::from_array(accessor.get(i as usize)) * weight;
                 }
                 Ok(())
@@ -140,28 +150,15 @@ fn joints(
     joints.collect()
 }
 
-fn skin(
-    document: &Document,
-    json: &json::mesh::Primitive,
-    at: &str,
-    source: &[u32],
-    vertices: usize,
-    joints: &[DAffine3],
-    out: &mut Primitive,
-) -> Result<(), Error> {
-    let mut blended = vec![(DMat3::ZERO, DVec3::ZERO, 0.0f64); source.len()];
+fn skin(file: &Attributes, joints: &[DAffine3], out: &mut Primitive) -> Result<(), Error> {
+    let mut blended = vec![(DMat3::ZERO, DVec3::ZERO, 0.0f64); file.source.len()];
     for set in 0..SETS {
         let open = |semantic: Semantic, components: &[ComponentType]| {
-            let Some(&index) = json.attributes.get(&Checked::Valid(semantic.clone())) else {
+            let Some(&index) = file.json.attributes.get(&Checked::Valid(semantic.clone())) else {
                 return Ok(None);
             };
-            let user = format!("{at}.attributes.{}", semantic.to_string());
-            let accessor = Accessor::open(document, index, &user, &[Type::Vec4], components)?;
-            if accessor.len() != vertices {
-                let problem = format!("POSITION has {vertices}");
-                return Err(document.fault(format!("{user}.count"), accessor.len(), problem));
-            }
-            Ok(Some(accessor))
+            let name = format!("attributes.{}", semantic.to_string());
+            file.open(index, &name, Type::Vec4, components).map(Some)
         };
         let whole = [ComponentType::U8, ComponentType::U16];
         let shares = [ComponentType::F32, ComponentType::U8, ComponentType::U16];
@@ -170,12 +167,16 @@ fn skin(
         else {
             break;
         };
-        for (sum, &i) in blended.iter_mut().zip(source) {
+        for (sum, &i) in blended.iter_mut().zip(file.source) {
             let (j, w): ([f32; 4], [f32; 4]) = (numbers.get(i as usize), weights.get(i as usize));
             for (j, w) in j.into_iter().zip(w).filter(|(_, w)| *w > 0.0) {
                 let Some(m) = joints.get(j as usize) else {
-                    let user = format!("{at}.attributes.JOINTS_{set}, element {i}");
-                    return Err(document.fault(user, j, format!("the skin has {} joints", joints.len())));
+                    let user = format!("{}.attributes.JOINTS_{set}, element {i}", file.at);
+                    return Err(file.document.fault(
+                        user,
+                        j,
+                        format!("the skin has {} joints", joints.len()),
+                    ));
                 };
                 let w = f64::from(w);
                 *sum = (sum.0 + m.matrix3 * w, sum.1 + m.translation * w, sum.2 + w);

@@ -6,7 +6,7 @@ use gltf::json::mesh::Semantic;
 use gltf::json::validation::Checked;
 
 use super::accessor::Accessor;
-use super::deform::Deform;
+use super::deform::{Attributes, Deform};
 use super::document::Document;
 use super::error::Error;
 use super::tangents;
@@ -89,7 +89,8 @@ impl Primitive {
             out.normals = gather(&accessor, &source, Vec3::from_array);
         }
         if let Some(deform) = deform {
-            deform.apply(document, primitive, at, &source, vertices, &mut out)?;
+            let file = Attributes { document, json: primitive, at, source: &source, vertices };
+            deform.apply(&file, &mut out)?;
         }
         if needs.colors
             && let Some(accessor) = optional(Semantic::Colors(0))?

@@ -127,7 +127,7 @@ impl Hybrid<'_> {
         let has_diffuse = surface.bsdf.has_diffuse();
         let from_vertices = self.mode == DiffuseMode::Vertex && has_diffuse;
         let lit = if from_vertices && gloss == Gloss::None {
-            Direct { visible: 1.0, ..Direct::default() }
+            Direct::default()
         } else if has_diffuse || gloss != Gloss::None {
             direct(
                 self.world,
@@ -139,7 +139,7 @@ impl Hybrid<'_> {
                 rng,
             )
         } else {
-            Direct { visible: 1.0, ..Direct::default() }
+            Direct::default()
         };
         let mut out = Diffuse {
             direct: lit.diffuse,
