@@ -34,7 +34,7 @@ pub fn config(args: &RenderArgs) -> Result<Option<Config>> {
         None => Ok(None),
         Some(solver) => {
             let mut config = Config {
-                seed: args.seed,
+                seed: args.run.seed,
                 enforce: args.reciprocal,
                 overshoot: args.overshoot,
                 ambient: !args.no_ambient,

@@ -1,8 +1,7 @@
 //! What was typed, checked: a job that can be done, or the reason why not.
 
-use crate::args::{DiffuseArg, IntegratorArg, RenderArgs, WhichArgs};
+use crate::args::{DiffuseArg, IntegratorArg, RenderArgs, SkyArgs, WhichArgs};
 use crate::classical;
-use crate::values::SkyValue;
 use anyhow::Result;
 use geometry::Camera;
 use radiosity::classical::Config as Classical;
@@ -47,8 +46,8 @@ pub struct RenderJob {
     pub which: WhichArgs,
     /// Which camera, as typed.
     pub camera: Option<String>,
-    /// Light from beyond the scene, and its factor.
-    pub sky: Option<(SkyValue, f32)>,
+    /// Light from beyond the scene.
+    pub sky: SkyArgs,
     /// Result as JSON.
     pub json: bool,
     /// No notes.
@@ -122,10 +121,10 @@ impl RenderJob {
             exposure: args.exposure,
             which: args.which,
             camera: args.camera,
-            sky: args.sky.map(|sky| (sky, args.sky_strength)),
-            json: args.json,
-            quiet: args.quiet,
-            threads: args.threads,
+            sky: args.sky,
+            json: args.run.json,
+            quiet: args.run.quiet,
+            threads: args.run.threads,
             snapshots: args.snapshots,
             classical,
             size: match (args.size, args.width) {
@@ -134,7 +133,7 @@ impl RenderJob {
                 (None, None) => Size::Usual,
             },
             error: args.error,
-            seed: args.seed,
+            seed: args.run.seed,
             integrator: match args.integrator {
                 IntegratorArg::Hybrid => Integrator::Hybrid,
                 IntegratorArg::Path => Integrator::Path { spp: args.spp.unwrap_or(USUAL_SPP) },

@@ -13,6 +13,7 @@ mod doctor;
 mod job;
 mod load;
 mod progress;
+mod room;
 mod values;
 
 use args::{Cli, Command};

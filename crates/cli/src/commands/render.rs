@@ -2,14 +2,15 @@
 
 use super::{print, snapshots};
 use crate::args::RenderArgs;
+use crate::cameras;
 use crate::job::{RenderJob, with_name};
 use crate::progress::Bars;
-use crate::{cameras, load};
+use crate::room::{Room, lap, start_threads};
 use anyhow::{Context, Result};
-use geometry::{Camera, Scene, World};
+use geometry::Camera;
 use raytrace::exr::Metadata;
 use raytrace::verify::{Judgement, Verdict};
-use raytrace::{Integrator, Outcome, Progress, Settings, exr, prepass_for, render, tonemap};
+use raytrace::{Integrator, Outcome, Settings, exr, prepass_for, render, tonemap};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -23,36 +24,17 @@ const MISSED: u8 = 3;
 pub fn run(args: RenderArgs) -> Result<ExitCode> {
     let job = RenderJob::new(args)?;
     let bars = Bars::new(job.quiet);
-    if let Some(n) = job.threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(n as usize)
-            .build_global()
-            .context("cannot start threads")?;
-    }
+    start_threads(job.threads)?;
     bars.listen_for_interrupts();
 
-    let mut clock = Instant::now();
-    bars.stage("load", 0);
-    let mut loaded = load::scene(&job.scene, &job.which)?;
-    for warning in &loaded.warnings {
-        bars.note(&format!("warning: {warning}"));
-    }
-    if let Some((value, strength)) = &job.sky {
-        loaded.scene.sky = Some(load::sky(value, *strength)?);
-    }
-    let choice = cameras::choose(job.camera.as_deref(), &loaded.cameras, &loaded.scene)?;
+    let Room { world, cameras, warnings, stages } = Room::open(&job.scene, &job.which, &job.sky, &bars)?;
+    // What all pictures share is told with the first.
+    let mut shared = stages;
+    let choice = cameras::choose(job.camera.as_deref(), &cameras, &world.scene)?;
     if let Some(note) = &choice.note {
         bars.note(&format!("note: {note}"));
     }
-    if !is_lit(&loaded.scene) {
-        bars.note("warning: nothing in the file shines, the picture will be black: try --sky 1000 (cd/m2)");
-    }
-
-    // What all pictures share is told with the first.
-    let mut shared = vec![("load", lap(&mut clock))];
-    bars.stage("build", 0);
-    let world = World::new(loaded.scene);
-    shared.push(("build", lap(&mut clock)));
+    let mut clock = Instant::now();
     let several = job.camera.as_deref() == Some("all");
     let mut pictures = Vec::new();
     let (mut solution, mut rays_before, mut missed) = (None, 0, false);
@@ -106,7 +88,7 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
         }
     }
     if job.json {
-        let report = Report { scene: job.scene, warnings: loaded.warnings, pictures };
+        let report = Report { scene: job.scene, warnings, pictures };
         print(&serde_json::to_string_pretty(&report)?)?;
     }
     Ok(match () {
@@ -200,12 +182,6 @@ impl Picture {
     }
 }
 
-/// Seconds since `clock` was last asked.
-fn lap(clock: &mut Instant) -> f64 {
-    let now = Instant::now();
-    now.duration_since(std::mem::replace(clock, now)).as_secs_f64()
-}
-
 /// Writes what was rendered.
 pub(super) fn save(
     job: &RenderJob,
@@ -274,12 +250,4 @@ fn metadata(camera: &Camera, settings: &Settings, finished: bool, texts: &[(Stri
         metadata.push("unfinished", "stopped before the error asked was reached");
     }
     metadata
-}
-
-/// Whether anything shines.
-fn is_lit(scene: &Scene) -> bool {
-    let used = |m: &geometry::MaterialId| {
-        scene.materials.get(m.0 as usize).is_some_and(|m| m.unlit || !m.emissive.is_black())
-    };
-    scene.sky.is_some() || !scene.lights.is_empty() || scene.mesh.materials.iter().any(used)
 }

@@ -1,38 +1,10 @@
-//! What was typed.
+//! `twolight render`.
 
-use crate::values::{self, SkyValue};
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use super::{RunArgs, SkyArgs, WhichArgs};
+use crate::values;
+use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 use std::time::Duration;
-
-/// Render glTF rooms in physical units: radiosity once, rays for the rest.
-#[derive(Debug, Parser)]
-#[command(
-    name = "twolight",
-    version,
-    arg_required_else_help = true,
-    after_help = "Results go to stdout, progress and warnings to stderr.\n\
-                  Exit status: 0 done, 1 failed, 2 asked wrongly, 3 written but not as exact as asked.\n\n\
-                  Start with:\n  \
-                  twolight inspect room.glb\n  \
-                  twolight render room.glb -o room.exr --preview room.png"
-)]
-pub struct Cli {
-    /// What to do
-    #[command(subcommand)]
-    pub command: Command,
-}
-
-/// The subcommands.
-#[derive(Debug, Subcommand)]
-pub enum Command {
-    /// Render a scene to an EXR file with its layers, in cd/m2
-    Render(Box<RenderArgs>),
-    /// Show what is in a scene, what lights it, and what is wrong with it
-    Inspect(InspectArgs),
-    /// Measure how far a picture is from a reference
-    Compare(CompareArgs),
-}
 
 /// Arguments of `render`.
 #[derive(Debug, Args)]
@@ -79,12 +51,8 @@ pub struct RenderArgs {
     /// Stop after this time with what there is: 60s, 5m, 1h
     #[arg(long, value_name = "TIME", value_parser = values::duration)]
     pub time_limit: Option<Duration>,
-    /// Light from beyond the scene: a panorama (.hdr, .exr) or an even radiance in cd/m2, V or R,G,B
-    #[arg(long, value_name = "FILE|R,G,B", value_parser = values::sky)]
-    pub sky: Option<SkyValue>,
-    /// Factor on the sky
-    #[arg(long, value_name = "FACTOR", default_value = "1", requires = "sky", value_parser = values::strength)]
-    pub sky_strength: f32,
+    #[command(flatten)]
+    pub sky: SkyArgs,
     /// How the light is found
     #[arg(long, value_enum, default_value_t = IntegratorArg::Hybrid, help_heading = "Methods")]
     pub integrator: IntegratorArg,
@@ -128,18 +96,8 @@ pub struct RenderArgs {
     /// Do not measure the picture's error by probes, nor go on where it is missed
     #[arg(long)]
     pub no_verify: bool,
-    /// Seed of all random numbers
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub seed: u64,
-    /// Threads to use; one for each processor if absent
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
-    pub threads: Option<u32>,
-    /// Print the result as JSON
-    #[arg(long)]
-    pub json: bool,
-    /// No progress, notes or warnings
-    #[arg(short, long)]
-    pub quiet: bool,
+    #[command(flatten)]
+    pub run: RunArgs,
 }
 
 /// `--integrator`.
@@ -171,81 +129,4 @@ pub enum DiffuseArg {
     Split,
     /// A bounce of rays for each pixel: slowest
     Gather,
-}
-
-/// What of a file to show.
-#[derive(Clone, Debug, Default, Args)]
-pub struct WhichArgs {
-    /// Scene by name or number; the file's default if absent
-    #[arg(long = "scene", value_name = "NAME|NUMBER", id = "which-scene")]
-    pub scene: Option<String>,
-    /// Variant of the materials by name (KHR_materials_variants); the default ones if absent
-    #[arg(long, value_name = "NAME")]
-    pub variant: Option<String>,
-    /// Time in the first animation, in seconds; the rest pose if absent
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = values::number)]
-    pub time: Option<f32>,
-}
-
-/// Arguments of `inspect`.
-#[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  twolight inspect room.glb --json | jq .cameras
-  twolight inspect room.glb --plan --error 1%                what light is in it, and how it will be found")]
-pub struct InspectArgs {
-    /// Scene, .gltf or .glb
-    pub scene: PathBuf,
-    /// Say instead what light each camera sees, and how a render will find it
-    #[arg(long)]
-    pub plan: bool,
-    /// Error that the render would be asked for
-    #[arg(long, value_name = "PERCENT", default_value = "2%", requires = "plan", value_parser = values::share)]
-    pub error: f32,
-    #[command(flatten)]
-    pub which: WhichArgs,
-    /// Print as JSON
-    #[arg(long)]
-    pub json: bool,
-}
-
-/// Arguments of `compare`.
-#[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  twolight compare out.exr ref.exr
-  twolight compare out.exr ref.exr --difference where.png    where the error is, in false colour
-  twolight compare out.exr ref.exr --max-error 3%            fails (1) if the error is larger
-
-error is the root of the mean squared error relative to each pixel's brightness; flip, in [0, 1], says
-how much the eye would notice. Where ref.a.exr and ref.b.exr, independent halves of the reference, lie
-beside ref.exr, the reference's own noise is removed.")]
-pub struct CompareArgs {
-    /// Picture, .exr
-    pub picture: PathBuf,
-    /// Reference, .exr, of the same size
-    pub reference: PathBuf,
-    /// Write the error of each pixel: .png in false colour (black 0.1 %, pale yellow 100 %), .exr as numbers
-    #[arg(long, value_name = "D.png|D.exr")]
-    pub difference: Option<PathBuf>,
-    /// Leave out FLIP, the slowest of the numbers
-    #[arg(long)]
-    pub no_flip: bool,
-    /// Fail if the error is larger
-    #[arg(long, value_name = "PERCENT", value_parser = values::share)]
-    pub max_error: Option<f32>,
-    /// Print as JSON, in percent (flip in [0, 1])
-    #[arg(long)]
-    pub json: bool,
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use clap::CommandFactory;
-
-    #[test]
-    fn the_command_line_is_consistent() {
-        Cli::command().debug_assert();
-    }
 }

@@ -1,0 +1,94 @@
+//! What was typed: a file for each subcommand, and here what several share.
+
+mod compare;
+mod inspect;
+mod render;
+
+pub use compare::CompareArgs;
+pub use inspect::InspectArgs;
+pub use render::{DiffuseArg, IntegratorArg, RenderArgs, SolverArg};
+
+use crate::values::{self, SkyValue};
+use clap::{Args, Parser, Subcommand};
+
+/// Render glTF rooms in physical units: radiosity once, rays for the rest.
+#[derive(Debug, Parser)]
+#[command(
+    name = "twolight",
+    version,
+    arg_required_else_help = true,
+    after_help = "Results go to stdout, progress and warnings to stderr.\n\
+                  Exit status: 0 done, 1 failed, 2 asked wrongly, 3 written but not as exact as asked.\n\n\
+                  Start with:\n  \
+                  twolight inspect room.glb\n  \
+                  twolight render room.glb -o room.exr --preview room.png"
+)]
+pub struct Cli {
+    /// What to do
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The subcommands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Render a scene to an EXR file with its layers, in cd/m2
+    Render(Box<RenderArgs>),
+    /// Show what is in a scene, what lights it, and what is wrong with it
+    Inspect(InspectArgs),
+    /// Measure how far a picture is from a reference
+    Compare(CompareArgs),
+}
+
+/// What of a file to show.
+#[derive(Clone, Debug, Default, Args)]
+pub struct WhichArgs {
+    /// Scene by name or number; the file's default if absent
+    #[arg(long = "scene", value_name = "NAME|NUMBER", id = "which-scene")]
+    pub scene: Option<String>,
+    /// Variant of the materials by name (KHR_materials_variants); the default ones if absent
+    #[arg(long, value_name = "NAME")]
+    pub variant: Option<String>,
+    /// Time in the first animation, in seconds; the rest pose if absent
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = values::number)]
+    pub time: Option<f32>,
+}
+
+/// Light from beyond the scene.
+#[derive(Clone, Debug, Args)]
+pub struct SkyArgs {
+    /// Light from beyond the scene: a panorama (.hdr, .exr) or an even radiance in cd/m2, V or R,G,B
+    #[arg(long, value_name = "FILE|R,G,B", value_parser = values::sky)]
+    pub sky: Option<SkyValue>,
+    /// Factor on the sky
+    #[arg(long, value_name = "FACTOR", default_value = "1", requires = "sky", value_parser = values::strength)]
+    pub sky_strength: f32,
+}
+
+/// How the program runs, whatever it does.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct RunArgs {
+    /// Seed of all random numbers
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Threads to use; one for each processor if absent
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub threads: Option<u32>,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// No progress, notes or warnings
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+}

@@ -1,0 +1,65 @@
+//! A scene that can be worked in: read, lit, and made ready for rays.
+
+use crate::args::{SkyArgs, WhichArgs};
+use crate::load;
+use crate::progress::Bars;
+use anyhow::{Context, Result};
+use geometry::{Camera, MaterialId, Scene, World};
+use raytrace::Progress;
+use std::path::Path;
+use std::time::Instant;
+
+/// A scene, loaded and built.
+#[derive(Debug)]
+pub struct Room {
+    /// The scene and what answers questions about it.
+    pub world: World,
+    /// The file's cameras.
+    pub cameras: Vec<Camera>,
+    /// What was odd about the file.
+    pub warnings: Vec<String>,
+    /// Seconds of each stage.
+    pub stages: Vec<(&'static str, f64)>,
+}
+
+impl Room {
+    /// Reads `path`, adds the sky that was asked for, builds the tree; says on stderr what is odd.
+    pub fn open(path: &Path, which: &WhichArgs, sky: &SkyArgs, bars: &Bars) -> Result<Room> {
+        let mut clock = Instant::now();
+        bars.stage("load", 0);
+        let mut loaded = load::scene(path, which)?;
+        for warning in &loaded.warnings {
+            bars.note(&format!("warning: {warning}"));
+        }
+        if let Some(value) = &sky.sky {
+            loaded.scene.sky = Some(load::sky(value, sky.sky_strength)?);
+        }
+        if !is_lit(&loaded.scene) {
+            bars.note("warning: nothing in the file shines, all will be black: try --sky 1000 (cd/m2)");
+        }
+        let mut stages = vec![("load", lap(&mut clock))];
+        bars.stage("build", 0);
+        let world = World::new(loaded.scene);
+        stages.push(("build", lap(&mut clock)));
+        Ok(Room { world, cameras: loaded.cameras, warnings: loaded.warnings, stages })
+    }
+}
+
+/// Starts `threads` threads, or one for each processor.
+pub fn start_threads(threads: Option<u32>) -> Result<()> {
+    let Some(n) = threads else { return Ok(()) };
+    rayon::ThreadPoolBuilder::new().num_threads(n as usize).build_global().context("cannot start threads")
+}
+
+/// Seconds since `clock` was last asked.
+pub fn lap(clock: &mut Instant) -> f64 {
+    let now = Instant::now();
+    now.duration_since(std::mem::replace(clock, now)).as_secs_f64()
+}
+
+/// Whether anything shines.
+fn is_lit(scene: &Scene) -> bool {
+    let used =
+        |m: &MaterialId| scene.materials.get(m.0 as usize).is_some_and(|m| m.unlit || !m.emissive.is_black());
+    scene.sky.is_some() || !scene.lights.is_empty() || scene.mesh.materials.iter().any(used)
+}
