@@ -10,8 +10,8 @@ use radiosity::patch_to_vertex::Fit;
 /// Bytes that a matrix may take where the system does not say what is free.
 const USUAL_MEMORY: u64 = 4 << 30;
 
-/// The classical solver that is asked for, or none.
-pub fn config(args: &RenderArgs) -> Result<Option<Config>> {
+/// The classical solver that is asked for, or none, for a picture of relative error `error`.
+pub fn config(args: &RenderArgs, error: f32) -> Result<Option<Config>> {
     let wrong = |message: &str| Err(AskedWrongly(message.into()).into());
     let solver = match args.solver {
         Some(SolverArg::Matrix) => Some(Solver::Matrix),
@@ -39,7 +39,7 @@ pub fn config(args: &RenderArgs) -> Result<Option<Config>> {
                 overshoot: args.overshoot,
                 ambient: !args.no_ambient,
                 most_bytes: free_memory().map_or(USUAL_MEMORY, |free| free / 10 * 8),
-                ..Config::for_error(solver, args.error)
+                ..Config::for_error(solver, error)
             };
             if let Some(n) = args.patches {
                 config.patches = n as usize;

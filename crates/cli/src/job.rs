@@ -1,10 +1,11 @@
 //! What was typed, checked: a job that can be done, or the reason why not.
 
-use crate::args::{DiffuseArg, IntegratorArg, RenderArgs, SkyArgs, WhichArgs};
+use crate::args::{DiffuseArg, IntegratorArg, LightArgs, RenderArgs, WhichArgs};
 use crate::classical;
 use anyhow::Result;
 use geometry::Camera;
 use radiosity::classical::Config as Classical;
+use radiosity::solution_file::About;
 use raytrace::output::check_writable;
 use raytrace::{DiffuseMode, Integrator, Settings};
 use std::path::{Path, PathBuf};
@@ -18,6 +19,8 @@ const USUAL_ASPECT: f32 = 4.0 / 3.0;
 const MOST_PIXELS: u64 = 100_000_000;
 /// Paths through each pixel where none are asked for.
 const USUAL_SPP: u32 = 256;
+/// Error where none is asked for.
+const USUAL_ERROR: f32 = 0.02;
 
 /// A request that no scene could satisfy, or that this scene cannot: exit status 2.
 #[derive(Debug)]
@@ -46,8 +49,12 @@ pub struct RenderJob {
     pub which: WhichArgs,
     /// Which camera, as typed.
     pub camera: Option<String>,
-    /// Light from beyond the scene.
-    pub sky: SkyArgs,
+    /// What shines, beside what the file says.
+    pub light: LightArgs,
+    /// Solution to use.
+    pub solution: Option<PathBuf>,
+    /// A layer for each lamp.
+    pub light_layers: bool,
     /// Result as JSON.
     pub json: bool,
     /// No notes.
@@ -59,7 +66,7 @@ pub struct RenderJob {
     /// A classical solver in place of the default one.
     pub classical: Option<Classical>,
     size: Size,
-    error: f32,
+    error: Option<f32>,
     seed: u64,
     integrator: Integrator,
     diffuse: DiffuseMode,
@@ -89,7 +96,18 @@ impl RenderJob {
                 "--diffuse, --gather-rays and --samples steer the hybrid, not --integrator path".into(),
             );
         }
-        let classical = classical::config(&args)?;
+        if args.solution.is_some() && (path_traced || args.solver.is_some() || args.gather_rays.is_some()) {
+            return wrong(
+                "--solution stands in for the first pass: not with --integrator path, --solver or --gather-rays"
+                    .into(),
+            );
+        }
+        if args.light_layers && (args.solver.is_some() || args.snapshots) {
+            return wrong(
+                "the classical solvers keep no lamps apart: --light-layers needs the default one".into(),
+            );
+        }
+        let classical = classical::config(&args, args.error.unwrap_or(USUAL_ERROR))?;
         if let Some((w, h)) = args.size {
             check_size(w, h)?;
         }
@@ -121,7 +139,7 @@ impl RenderJob {
             exposure: args.exposure,
             which: args.which,
             camera: args.camera,
-            sky: args.sky,
+            light: args.light,
             json: args.run.json,
             quiet: args.run.quiet,
             threads: args.run.threads,
@@ -147,17 +165,24 @@ impl RenderJob {
             gather_rays: args.gather_rays,
             samples: args.samples,
             verify: !args.no_verify,
+            solution: args.solution,
+            light_layers: args.light_layers,
         })
     }
 
-    /// The settings for one camera; the time limit starts to run now.
-    pub fn settings(&self, camera: &Camera) -> Result<Settings> {
+    /// Error that is asked of the pictures: what was typed, or what a solution was made for, or 2 %.
+    pub fn error(&self, solution: Option<&About>) -> f32 {
+        self.error.or(solution.map(|about| about.error)).unwrap_or(USUAL_ERROR)
+    }
+
+    /// The settings for one camera, at this error; the time limit starts to run now.
+    pub fn settings(&self, camera: &Camera, error: f32) -> Result<Settings> {
         let (width, height) = self.picture_size(camera.aspect)?;
         Ok(Settings {
             width,
             height,
             seed: self.seed,
-            error: self.error,
+            error,
             integrator: self.integrator,
             diffuse: self.diffuse,
             classical: self.classical.clone(),
@@ -165,6 +190,7 @@ impl RenderJob {
             gather_rays: self.gather_rays,
             samples: self.samples,
             verify: self.verify,
+            by_light: self.light_layers,
         })
     }
 

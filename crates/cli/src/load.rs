@@ -25,7 +25,7 @@ pub fn sky(value: &SkyValue, strength: f32) -> Result<Sky> {
             panorama(path).with_context(|| format!("cannot use {} as sky", path.display()))?
         }
     };
-    Ok(sky.scaled(strength))
+    Ok(sky.scaled(Rgb::splat(strength)))
 }
 
 fn panorama(path: &Path) -> Result<Sky> {

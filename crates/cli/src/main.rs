@@ -14,6 +14,7 @@ mod job;
 mod load;
 mod progress;
 mod room;
+mod solutions;
 mod values;
 
 use args::{Cli, Command};
@@ -23,6 +24,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Render(args) => commands::render::run(*args),
+        Command::Solve(args) => commands::solve::run(&args),
         Command::Inspect(args) => commands::inspect::run(&args),
         Command::Compare(args) => commands::compare::run(&args),
     };

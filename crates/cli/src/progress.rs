@@ -41,6 +41,14 @@ impl Bars {
         let _ = ctrlc::set_handler(handler);
     }
 
+    /// From now on Ctrl-C ends the process with these words: for work that is kept as it goes.
+    pub fn end_at_interrupts(&self, words: &'static str) {
+        let _ = ctrlc::set_handler(move || {
+            eprintln!("\n{words}");
+            std::process::exit(130);
+        });
+    }
+
     /// Whether the user asked to stop.
     pub fn interrupted(&self) -> bool {
         self.stop.load(Ordering::Relaxed)

@@ -1,6 +1,7 @@
 //! A scene that can be worked in: read, lit, and made ready for rays.
 
-use crate::args::{SkyArgs, WhichArgs};
+use crate::args::{LightArgs, WhichArgs};
+use crate::job::AskedWrongly;
 use crate::load;
 use crate::progress::Bars;
 use anyhow::{Context, Result};
@@ -23,16 +24,24 @@ pub struct Room {
 }
 
 impl Room {
-    /// Reads `path`, adds the sky that was asked for, builds the tree; says on stderr what is odd.
-    pub fn open(path: &Path, which: &WhichArgs, sky: &SkyArgs, bars: &Bars) -> Result<Room> {
+    /// Reads `path`, lights it as asked, builds the tree; says on stderr what is odd.
+    pub fn open(path: &Path, which: &WhichArgs, light: &LightArgs, bars: &Bars) -> Result<Room> {
         let mut clock = Instant::now();
         bars.stage("load", 0);
         let mut loaded = load::scene(path, which)?;
         for warning in &loaded.warnings {
             bars.note(&format!("warning: {warning}"));
         }
-        if let Some(value) = &sky.sky {
-            loaded.scene.sky = Some(load::sky(value, sky.sky_strength)?);
+        if let Some(value) = &light.sky {
+            loaded.scene.sky = Some(load::sky(value, light.sky_strength)?);
+        }
+        let names = loaded.scene.light_names();
+        for (name, factor) in &light.lights {
+            if !names.contains(name) {
+                let message = format!("there is no light {name:?}; the file has {}", names.join(", "));
+                return Err(AskedWrongly(message).into());
+            }
+            loaded.scene.scale_lights(name, *factor);
         }
         if !is_lit(&loaded.scene) {
             bars.note("warning: nothing in the file shines, all will be black: try --sky 1000 (cd/m2)");

@@ -80,6 +80,18 @@ pub fn sky(s: &str) -> Result<SkyValue, String> {
     }
 }
 
+/// A factor on the lamps of a name: "Desk lamp=0.5", "sky=1,0.9,0.8".
+pub fn light(s: &str) -> Result<(String, Rgb), String> {
+    let help = "write NAME=FACTOR or NAME=R,G,B, such as Lamp=0.5";
+    let (name, factor) = s.rsplit_once('=').ok_or(help)?;
+    let factors: Result<Vec<f32>, String> = factor.split(',').map(strength).collect();
+    match factors?[..] {
+        [v] if !name.is_empty() => Ok((name.into(), Rgb::splat(v))),
+        [r, g, b] if !name.is_empty() => Ok((name.into(), Rgb::new(r, g, b))),
+        _ => Err(help.into()),
+    }
+}
+
 /// A finite number that is not negative.
 pub fn strength(s: &str) -> Result<f32, String> {
     let value = number(s)?;
@@ -124,6 +136,15 @@ mod tests {
         assert_eq!(size("640x480"), Ok((640, 480)));
         for bad in ["640", "0x4", "4x", "axb", "4x-4", "1x2x3"] {
             assert!(size(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn lamps_take_a_factor_or_a_tint() {
+        assert_eq!(light("Desk lamp=0.5"), Ok(("Desk lamp".into(), Rgb::splat(0.5))));
+        assert_eq!(light("a=b=1,0.5,0"), Ok(("a=b".into(), Rgb::new(1.0, 0.5, 0.0))));
+        for bad in ["", "Lamp", "=1", "Lamp=", "Lamp=-1", "Lamp=1,2", "Lamp=inf"] {
+            assert!(light(bad).is_err(), "{bad}");
         }
     }
 

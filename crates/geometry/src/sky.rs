@@ -36,13 +36,13 @@ impl Sky {
         SkyImage::new(width, height, pixels).map(|image| Sky::Image(Box::new(image)))
     }
 
-    /// The same sky, `strength` ≥ 0 times as bright.
-    pub fn scaled(self, strength: f32) -> Sky {
+    /// The same sky, `factor` ≥ 0 times as bright, channel by channel.
+    pub fn scaled(self, factor: Rgb) -> Sky {
         match self {
-            Sky::Constant(l) => Sky::Constant(l * strength),
+            Sky::Constant(l) => Sky::Constant(l * factor),
             Sky::Image(mut image) => {
-                image.pixels.iter_mut().for_each(|l| *l *= strength);
-                image.mean *= strength;
+                image.strength *= factor;
+                image.mean *= factor;
                 Sky::Image(image)
             }
         }
@@ -94,6 +94,8 @@ pub struct SkyImage {
     width: u32,
     height: u32,
     pixels: Vec<Rgb>,
+    /// Factor on them, so that a dimmed panorama is known as the same one.
+    strength: Rgb,
     /// Running sums of the rows' weights, `height` + 1 of them, ending at 1.
     rows: Vec<f32>,
     /// For each row the running sums of its pixels, `width` + 1 of them, ending at 1.
@@ -134,7 +136,7 @@ impl SkyImage {
         }
         let rows = running_sums(&rows);
         let mean = Rgb::new(mean[0] as f32, mean[1] as f32, mean[2] as f32);
-        Some(SkyImage { width, height, pixels, rows, columns, mean })
+        Some(SkyImage { width, height, pixels, strength: Rgb::WHITE, rows, columns, mean })
     }
 
     fn radiance(&self, d: Vec3) -> Rgb {
@@ -147,7 +149,17 @@ impl SkyImage {
             self.pixels[(y * w + x) as usize]
         };
         let (fx, fy) = (x - x0, y - y0);
-        pixel(0, 0).lerp(pixel(1, 0), fx).lerp(pixel(0, 1).lerp(pixel(1, 1), fx), fy)
+        pixel(0, 0).lerp(pixel(1, 0), fx).lerp(pixel(0, 1).lerp(pixel(1, 1), fx), fy) * self.strength
+    }
+
+    /// Factor on the pixels.
+    pub fn strength(&self) -> Rgb {
+        self.strength
+    }
+
+    /// The image's own radiance, cd/m², before the factor; rows from the top.
+    pub fn pixels(&self) -> &[Rgb] {
+        &self.pixels
     }
 
     fn row(&self, y: usize) -> &[f32] {
@@ -277,7 +289,7 @@ mod tests {
         // The top row at u = 3/4 is nearly straight up, leaning toward +z.
         assert!(sky.radiance(Vec3::new(0.0, 1.0, 0.045).normalize()).g > 3.0);
         assert!(Sky::image(3, 3, vec![Rgb::WHITE; 8]).is_none());
-        assert!((sky.scaled(2.0).radiance(Vec3::new(1.0, -0.04, 0.04).normalize()).r) > 1.6);
+        assert!((sky.scaled(Rgb::splat(2.0)).radiance(Vec3::new(1.0, -0.04, 0.04).normalize()).r) > 1.6);
     }
 
     #[test]

@@ -42,6 +42,11 @@ impl World {
         World { bvh, emitters, diagonal, scale, bounds, see_through, scene }
     }
 
+    /// Gathers anew what shines, after the scene's emissions were changed, and nothing else of it.
+    pub fn relight(&mut self) {
+        self.emitters = Emitters::build(&self.scene);
+    }
+
     /// The nearest triangle the ray meets.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         self.bvh.closest_hit(ray)

@@ -4,13 +4,13 @@
 //! surface after at least one specular event. Density estimation gives irradiance back: Jensen, "Global
 //! Illumination using Photon Maps", EGWR 1996. What the gather rays already count ([`crate::gather`]) is left out.
 
+use crate::bytes::{Plain, Reader, put_all, record};
 use crate::element::{Elements, Side, slot};
-use crate::field::Field;
 use crate::gather::ROUGH;
 use geometry::bsdf::Transport;
 use geometry::math::offset_origin;
 use geometry::sampling::Rng;
-use geometry::{Ray, Rgb, Surface, Vec3, World, optics};
+use geometry::{LightGroups, Mesh, Ray, Rgb, Surface, Vec3, World, optics};
 use rayon::prelude::*;
 
 /// Photons that one estimate of irradiance uses.
@@ -46,6 +46,8 @@ struct Photon {
     triangle: u32,
     uv: [f32; 2],
     side: Side,
+    /// Group of lights it came from; 0 where these are not kept apart.
+    group: u16,
 }
 
 /// The photons of a scene, searchable by place.
@@ -64,6 +66,17 @@ pub struct Caustics {
 impl Caustics {
     /// Sends `particles` from the emitters, fewer when little light comes this way; none when nothing in the scene reflects or refracts sharply.
     pub fn trace(world: &World, elements: &Elements, particles: usize, seed: u64) -> Caustics {
+        Caustics::trace_groups(world, elements, particles, seed, None)
+    }
+
+    /// The same, each photon with the group of lights that it came from.
+    pub(crate) fn trace_groups(
+        world: &World,
+        elements: &Elements,
+        particles: usize,
+        seed: u64,
+        groups: Option<&LightGroups>,
+    ) -> Caustics {
         let targets = targets(world, elements);
         if targets.is_empty() || world.emitters.is_empty() {
             return Caustics::default();
@@ -73,7 +86,7 @@ impl Caustics {
                 let mut landed = Vec::new();
                 for i in 0..BATCH {
                     let mut rng = Rng::new(seed ^ 0x7068_6f74_6f6e, (batch * BATCH + i) as u64);
-                    send(world, &targets, &mut rng, &mut landed);
+                    send(world, &targets, groups, &mut rng, &mut landed);
                 }
                 landed
             };
@@ -169,22 +182,100 @@ impl Caustics {
 
     /// Irradiance by photons at every slot of the element mesh, lx: each photon's flux is shared among the corners
     /// of its leaf, so that Σ area · irradiance is the flux.
-    pub fn at_vertices(&self, elements: &Elements, field: &Field) -> Vec<Rgb> {
+    pub fn at_vertices(&self, elements: &Elements, usable: impl Fn(usize) -> bool) -> Vec<Rgb> {
+        self.at_vertices_of(elements, usable, |_| true)
+    }
+
+    /// The same of the photons of one group of lights.
+    pub(crate) fn part_at_vertices(
+        &self,
+        elements: &Elements,
+        usable: impl Fn(usize) -> bool,
+        group: usize,
+    ) -> Vec<Rgb> {
+        self.at_vertices_of(elements, usable, |photon| photon.group as usize == group)
+    }
+
+    fn at_vertices_of(
+        &self,
+        elements: &Elements,
+        usable: impl Fn(usize) -> bool,
+        counts: impl Fn(&Photon) -> bool,
+    ) -> Vec<Rgb> {
         if self.photons.is_empty() {
             return Vec::new();
         }
         let area = elements.vertex_areas();
         let mut irradiance = vec![Rgb::BLACK; 2 * elements.vertices.len()];
-        for photon in &self.photons {
+        for photon in self.photons.iter().filter(|p| counts(p)) {
             let (leaf, w) = elements.locate(photon.triangle, photon.uv[0], photon.uv[1]);
             for (v, w) in elements.nodes[leaf as usize].vertices.into_iter().zip(w) {
                 let slot = slot(v, photon.side);
-                if field.usable(slot) && area[v as usize] > 0.0 {
+                if usable(slot) && area[v as usize] > 0.0 {
                     irradiance[slot] += photon.flux * (w / area[v as usize]);
                 }
             }
         }
         irradiance
+    }
+
+    /// The same photons, those of each group of lights `factors` times as bright, channel by channel.
+    pub(crate) fn scaled(&self, factors: &[Rgb]) -> Caustics {
+        let mut scaled = self.clone();
+        for photon in &mut scaled.photons {
+            photon.flux *= factors[photon.group as usize];
+        }
+        scaled
+    }
+}
+
+/// A photon as a file holds it: its normal is that of the side it landed on.
+struct Kept {
+    position: Vec3,
+    flux: Rgb,
+    triangle: u32,
+    uv: [f32; 2],
+    side: Side,
+    group: u16,
+    axis: u8,
+}
+
+record!(Kept { position: Vec3, flux: Rgb, triangle: u32, uv: [f32; 2], side: Side, group: u16, axis: u8 }
+    => Kept { position, flux, triangle, uv, side, group, axis });
+
+impl Caustics {
+    /// Appends them, for a file.
+    pub(crate) fn put(&self, out: &mut Vec<u8>) {
+        self.reach.put(out);
+        (self.sent as u64).put(out);
+        let kept = |(p, &axis): (&Photon, &u8)| {
+            let Photon { position, flux, triangle, uv, side, group, .. } = *p;
+            Kept { position, flux, triangle, uv, side, group, axis }
+        };
+        put_all(&self.photons.iter().zip(&self.axes).map(kept).collect::<Vec<_>>(), out);
+    }
+
+    /// What [`Caustics::put`] wrote; `None` if it is no such thing.
+    pub(crate) fn get(from: &mut Reader, mesh: &Mesh, groups: usize) -> Option<Caustics> {
+        let (reach, sent) = (from.one()?, from.one::<u64>()? as usize);
+        let kept: Vec<Kept> = from.all()?;
+        let sound = |k: &Kept| {
+            (k.triangle as usize) < mesh.triangles.len()
+                && (k.group as usize) < groups.max(1)
+                && k.axis < 3
+                && k.flux.is_finite()
+                && k.position.is_finite()
+        };
+        if !kept.par_iter().all(sound) {
+            return None;
+        }
+        let photon = |k: &Kept| {
+            let Kept { position, flux, triangle, uv, side, group, .. } = *k;
+            let normal = mesh.geometric_normal(triangle) * side.sign();
+            Photon { position, normal, flux, triangle, uv, side, group }
+        };
+        let photons = kept.par_iter().map(photon).collect();
+        Some(Caustics { photons, axes: kept.iter().map(|k| k.axis).collect(), reach, sent })
     }
 }
 
@@ -216,7 +307,13 @@ fn targets(world: &World, elements: &Elements) -> Vec<(Vec3, f32)> {
 }
 
 /// One particle's way.
-fn send(world: &World, targets: &[(Vec3, f32)], rng: &mut Rng, landed: &mut Vec<Photon>) {
+fn send(
+    world: &World,
+    targets: &[(Vec3, f32)],
+    groups: Option<&LightGroups>,
+    rng: &mut Rng,
+    landed: &mut Vec<Photon>,
+) {
     let u = rng.array();
     let Some(start) = world.emitters.emit_toward(&world.scene, targets, u) else { return };
     let mut flux = start.flux;
@@ -246,6 +343,7 @@ fn send(world: &World, targets: &[(Vec3, f32)], rng: &mut Rng, landed: &mut Vec<
                 triangle: hit.triangle,
                 uv: [hit.u, hit.v],
                 side: Side::met(surface.front),
+                group: groups.map_or(0, |groups| groups.of_light(start.light) as u16),
             });
         }
         // Only specular lobes lead on: what is scattered diffusely is the solver's.
@@ -330,6 +428,7 @@ mod tests {
                 triangle: 0,
                 uv: [0.0; 2],
                 side: Side::Front,
+                group: 0,
             })
             .collect();
         let mut axes = vec![0; n];

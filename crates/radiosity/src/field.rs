@@ -23,8 +23,8 @@ pub struct Site {
 }
 
 /// Where a slot's value comes from.
-#[derive(Clone, Copy, Debug)]
-enum Source {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Source {
     /// Light cannot reach it, or it is buried in something: it says nothing about its surroundings.
     Nothing,
     /// It was gathered.
@@ -32,7 +32,37 @@ enum Source {
     /// Interpolated from sites near by; weights sum to 1, unused ones are 0.
     Near([u32; 4], [f32; 4]),
     /// In the middle of an edge that promised no change on this side: the mean of the slots at its ends.
-    Between(usize, usize),
+    Between(u32, u32),
+}
+
+/// Where every slot's value comes from.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Sources(pub(crate) Vec<Source>);
+
+impl Sources {
+    /// Whether the slot has a value that its surroundings may be interpolated from.
+    pub(crate) fn usable(&self, slot: usize) -> bool {
+        !matches!(self.0[slot], Source::Nothing)
+    }
+
+    /// From a value at each site to a value at each slot.
+    pub(crate) fn spread(&self, e: &[Rgb]) -> Vec<Rgb> {
+        let value = |source: &Source| match source {
+            Source::Nothing | Source::Between(..) => Rgb::BLACK,
+            Source::Site(i) => e[*i as usize],
+            Source::Near(sites, weights) => {
+                sites.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(&i, &w)| e[i as usize] * w).sum()
+            }
+        };
+        let mut values: Vec<Rgb> = self.0.par_iter().map(value).collect();
+        // The ends of an edge are older than its middle, so they have their values by now.
+        for (slot, source) in self.0.iter().enumerate() {
+            if let Source::Between(a, b) = *source {
+                values[slot] = (values[a as usize] + values[b as usize]) * 0.5;
+            }
+        }
+        values
+    }
 }
 
 /// Sites, and how every vertex draws on them.
@@ -40,7 +70,7 @@ enum Source {
 pub struct Field {
     /// In the order in which they were gathered.
     pub sites: Vec<Site>,
-    sources: Vec<Source>,
+    pub(crate) sources: Sources,
     /// The ends of the edge in whose middle a vertex was put, for those that came by refinement.
     parents: HashMap<VertexId, [VertexId; 2]>,
 }
@@ -51,12 +81,7 @@ const BURIED: f32 = 0.5;
 impl Field {
     /// Whether the slot has a value that its surroundings may be interpolated from.
     pub fn usable(&self, slot: usize) -> bool {
-        !matches!(self.sources[slot], Source::Nothing)
-    }
-
-    /// Number of slots.
-    pub fn slots(&self) -> usize {
-        self.sources.len()
+        self.sources.usable(slot)
     }
 
     /// Remembers that `vertex` was put in the middle of the edge between `ends`.
@@ -66,51 +91,37 @@ impl Field {
 
     /// From a value at each site to a value at each slot.
     pub fn spread(&self, e: &[Rgb]) -> Vec<Rgb> {
-        let value = |source: &Source| match source {
-            Source::Nothing | Source::Between(..) => Rgb::BLACK,
-            Source::Site(i) => e[*i as usize],
-            Source::Near(sites, weights) => {
-                sites.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(&i, &w)| e[i as usize] * w).sum()
-            }
-        };
-        let mut values: Vec<Rgb> = self.sources.par_iter().map(value).collect();
-        // The ends of an edge are older than its middle, so they have their values by now.
-        for (slot, source) in self.sources.iter().enumerate() {
-            if let Source::Between(a, b) = *source {
-                values[slot] = (values[a] + values[b]) * 0.5;
-            }
-        }
-        values
+        self.sources.spread(e)
     }
 
     /// Estimated variance of a slot's value (mean of the channels) from the rays that were gathered, lx².
     pub fn variance(&self, slot: usize) -> f32 {
-        match &self.sources[slot] {
+        match &self.sources.0[slot] {
             Source::Nothing => 0.0,
             Source::Site(i) => self.sites[*i as usize].variance,
             Source::Near(sites, weights) => {
                 sites.iter().zip(weights).map(|(&i, w)| w * w * self.sites[i as usize].variance).sum()
             }
-            Source::Between(a, b) => 0.25 * (self.variance(*a) + self.variance(*b)),
+            Source::Between(a, b) => 0.25 * (self.variance(*a as usize) + self.variance(*b as usize)),
         }
     }
 
     /// The site that a slot draws on most.
     pub fn loudest(&self, slot: usize) -> Option<u32> {
-        match &self.sources[slot] {
+        match &self.sources.0[slot] {
             Source::Nothing => None,
             Source::Site(i) => Some(*i),
             Source::Near(sites, weights) => {
                 let best = (0..4).max_by(|&a, &b| weights[a].total_cmp(&weights[b]).then(b.cmp(&a)))?;
                 Some(sites[best])
             }
-            Source::Between(a, _) => self.loudest(*a),
+            Source::Between(a, _) => self.loudest(*a as usize),
         }
     }
 
     /// Largest difference (mean of the channels) among the sites that a slot is interpolated from; 0 for one of its own.
     pub fn spread_around(&self, slot: usize, e: &[Rgb]) -> f32 {
-        let Source::Near(sites, weights) = &self.sources[slot] else { return 0.0 };
+        let Source::Near(sites, weights) = &self.sources.0[slot] else { return 0.0 };
         let around =
             || sites.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(&i, _)| e[i as usize].mean());
         around().fold(0.0, f32::max) - around().fold(f32::INFINITY, f32::min).min(f32::MAX)
@@ -130,7 +141,7 @@ impl Field {
             }
         }
         let sites = &self.sites;
-        self.sources = (0..site_of.len())
+        let sources = (0..site_of.len())
             .into_par_iter()
             .map(|s| {
                 let (v, side) = ((s / 2) as VertexId, Side::BOTH[s % 2]);
@@ -142,11 +153,12 @@ impl Field {
                 }
             })
             .collect();
+        self.sources = Sources(sources);
         for (s, &site) in site_of.iter().enumerate() {
             let Some(ends) = self.parents.get(&((s / 2) as VertexId)) else { continue };
             if site == u32::MAX {
-                let [a, b] = ends.map(|v| 2 * v as usize + s % 2);
-                self.sources[s] = match (self.usable(a), self.usable(b)) {
+                let [a, b] = ends.map(|v| 2 * v + (s % 2) as u32);
+                self.sources.0[s] = match (self.usable(a as usize), self.usable(b as usize)) {
                     (true, true) => Source::Between(a, b),
                     (true, false) => Source::Between(a, a),
                     (false, true) => Source::Between(b, b),

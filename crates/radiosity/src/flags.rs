@@ -33,6 +33,16 @@ impl Flags {
         Flags { bits }
     }
 
+    /// All of it, for a file.
+    pub(crate) fn bits(&self) -> &[u8] {
+        &self.bits
+    }
+
+    /// From what [`Flags::bits`] gave.
+    pub(crate) fn of_bits(bits: Vec<u8>) -> Flags {
+        Flags { bits }
+    }
+
     fn get(&self, node: u32, side: Side) -> u8 {
         self.bits.get(2 * node as usize + side.index()).copied().unwrap_or(0)
     }

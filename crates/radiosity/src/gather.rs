@@ -11,7 +11,7 @@ use crate::element::Side;
 use crate::transport::{Landing, Row};
 use geometry::math::{offset_origin, to_world};
 use geometry::sampling::{Lattice2, Rng, cosine_hemisphere};
-use geometry::{Hit, Ray, Rgb, Surface, Vec3, World, optics};
+use geometry::{Hit, LightGroups, Ray, Rgb, Surface, Vec3, World, optics};
 use std::f32::consts::PI;
 
 /// From this GGX width (α = roughness²) up, a lobe is rough enough to sample lamps through it.
@@ -33,8 +33,15 @@ pub struct Followed {
 }
 
 /// Follows `ray` to the diffuse surface at its end and calls `land` there with the hit, its side, and the share of
-/// that surface's irradiance that comes back as radiosity.
-pub fn follow(world: &World, mut ray: Ray, rng: &mut Rng, mut land: impl FnMut(&Hit, Side, Rgb)) -> Followed {
+/// that surface's irradiance that comes back as radiosity; `lit` hears of each light that shone on a surface met, by its
+/// index among the world's, and what it adds to [`Followed::direct`].
+pub fn follow(
+    world: &World,
+    mut ray: Ray,
+    rng: &mut Rng,
+    mut land: impl FnMut(&Hit, Side, Rgb),
+    mut lit: impl FnMut(u32, Rgb),
+) -> Followed {
     let mut out = Followed { distance: f32::INFINITY, ..Followed::default() };
     let mut throughput = Rgb::WHITE;
     let mut specular = 0;
@@ -71,9 +78,14 @@ pub fn follow(world: &World, mut ray: Ray, rng: &mut Rng, mut land: impl FnMut(&
         let rough = specular == 0 && gloss > 0.0 && surface.bsdf.glossy_roughness() >= ROUGH;
         if chosen || rough {
             let scale = if chosen { 1.0 / p_diffuse } else { 0.0 };
-            out.direct += throughput * lamps_through(world, &surface, wo, scale, rough, rng) * PI;
-            if let Some(turned) = surface.turned().filter(|_| chosen) {
-                out.direct += throughput * lamps_through(world, &turned, -wo, scale, false, rng) * PI;
+            let behind = surface.turned().filter(|_| chosen);
+            let sides = [Some((&surface, wo, rough)), behind.as_ref().map(|turned| (turned, -wo, false))];
+            for (surface, wo, rough) in sides.into_iter().flatten() {
+                if let Some((light, brought)) = lamps_through(world, surface, wo, scale, rough, rng) {
+                    let brought = throughput * brought * PI;
+                    lit(light, brought);
+                    out.direct += brought;
+                }
             }
         }
         if chosen {
@@ -102,7 +114,8 @@ pub fn follow(world: &World, mut ray: Ray, rng: &mut Rng, mut land: impl FnMut(&
     out
 }
 
-/// Radiance toward `wo` of one light sample at `surface`: its diffuse lobe times `diffuse`, and its glossy lobe if asked.
+/// Radiance toward `wo` of one light sample at `surface`, and the light: its diffuse lobe times `diffuse`, and its glossy
+/// lobe if asked.
 fn lamps_through(
     world: &World,
     surface: &Surface,
@@ -110,15 +123,13 @@ fn lamps_through(
     diffuse: f32,
     glossy: bool,
     rng: &mut Rng,
-) -> Rgb {
+) -> Option<(u32, Rgb)> {
     let u = [rng.f32(), rng.f32(), rng.f32()];
-    let Some(light) = world.emitters.sample(&world.scene, surface.position, surface.ns, u) else {
-        return Rgb::BLACK;
-    };
+    let light = world.emitters.sample(&world.scene, surface.position, surface.ns, u)?;
     let cos = light.wi.dot(surface.ns);
     let beyond = light.wi.dot(surface.ng) <= 0.0;
     if beyond && !glossy {
-        return Rgb::BLACK;
+        return None;
     }
     let mut f = if beyond { Rgb::BLACK } else { surface.bsdf.eval_diffuse(wo, light.wi) * diffuse };
     if glossy {
@@ -126,9 +137,9 @@ fn lamps_through(
     }
     let brought = f * light.radiance * (cos.abs() / light.pdf);
     if brought.max_channel() <= 0.0 || !brought.is_finite() {
-        return Rgb::BLACK;
+        return None;
     }
-    brought * world.transmittance(&light.shadow_ray(surface.position, surface.ng))
+    Some((light.light, brought * world.transmittance(&light.shadow_ray(surface.position, surface.ng))))
 }
 
 /// A place to gather at: a point with the geometric normal of its facet, on the side of interest.
@@ -143,7 +154,8 @@ pub struct Origin {
 /// Gathers the rays of `pattern` around the unit normal `ns`, shared evenly among `origins`; the pattern is shifted
 /// by a random amount of its own for each `stream`.
 ///
-/// `dead` tells whether light can never reach a side of a triangle: a ray that meets one first is counted, and brings nothing.
+/// `dead` tells whether light can never reach a side of a triangle: a ray that meets one first is counted, and brings
+/// nothing. With `groups` the lights' parts are kept apart.
 pub fn row(
     world: &World,
     origins: &[Origin],
@@ -152,6 +164,7 @@ pub fn row(
     seed: u64,
     stream: u64,
     dead: impl Fn(u32, Side) -> bool,
+    groups: Option<&LightGroups>,
 ) -> Row {
     let mut rng = Rng::new(seed, stream);
     // The same shift everywhere would make the same error everywhere: 2.2 % on whole faces, measured.
@@ -160,6 +173,7 @@ pub fn row(
     let share = 1.0 / rays as f32;
     let mut landings = Vec::with_capacity(rays as usize);
     let mut direct = Rgb::BLACK;
+    let mut by_group = vec![Rgb::BLACK; groups.map_or(0, LightGroups::len)];
     let (mut met_dead, mut kept, mut square) = (0u32, 0f32, 0f32);
     for i in 0..rays {
         let origin = &origins[i as usize % origins.len()];
@@ -169,18 +183,32 @@ pub fn row(
             continue;
         }
         let ray = Ray::new(offset_origin(origin.position, origin.ng), wi);
-        let followed = follow(world, ray, &mut rng, |hit, side, weight| {
+        let land = |hit: &Hit, side, weight| {
             if !dead(hit.triangle, side) {
                 landings.push(Landing::new(hit.triangle, side, hit.u, hit.v, weight * share));
             }
-        });
+        };
+        let lit = |light, brought| {
+            if let Some(groups) = groups {
+                by_group[groups.of_light(light)] += brought * share;
+            }
+        };
+        let followed = follow(world, ray, &mut rng, land, lit);
         direct += followed.direct * share;
         square += followed.direct.mean().powi(2) * share;
         kept += followed.arrived * share;
         met_dead += u32::from(followed.first.is_some_and(|(t, side)| dead(t, side)));
     }
     let variance = lattice_share(rays) * (square - direct.mean().powi(2)).max(0.0) * share;
-    Row { direct, landings: landings.into_boxed_slice(), dead: met_dead as f32 * share, kept, variance, rays }
+    Row {
+        direct,
+        by_group: by_group.into_boxed_slice(),
+        landings: landings.into_boxed_slice(),
+        dead: met_dead as f32 * share,
+        kept,
+        variance,
+        rays,
+    }
 }
 
 /// Share of the variance of independent rays that a lattice of `rays` leaves: about half of it with 64; its error falls
@@ -190,8 +218,16 @@ pub(crate) fn lattice_share(rays: u32) -> f32 {
 }
 
 /// Irradiance (lx) straight from the emitters around the unit normal `ns`, by `samples` light samples shared evenly
-/// among `origins`.
-pub fn direct(world: &World, origins: &[Origin], ns: Vec3, samples: u32, seed: u64, stream: u64) -> Rgb {
+/// among `origins`; `lit` hears of each light's part.
+pub fn direct(
+    world: &World,
+    origins: &[Origin],
+    ns: Vec3,
+    samples: u32,
+    seed: u64,
+    stream: u64,
+    mut lit: impl FnMut(u32, Rgb),
+) -> Rgb {
     let mut rng = Rng::new(seed ^ 0x6469_7265_6374, stream);
     let mut sum = Rgb::BLACK;
     for i in 0..samples {
@@ -205,7 +241,9 @@ pub fn direct(world: &World, origins: &[Origin], ns: Vec3, samples: u32, seed: u
         let ray = light.shadow_ray(origin.position, origin.ng);
         let brought = light.radiance * (cos / light.pdf);
         if brought.is_finite() && !brought.is_black() {
-            sum += brought * world.transmittance(&ray);
+            let brought = brought * world.transmittance(&ray);
+            lit(light.light, brought / samples as f32);
+            sum += brought;
         }
     }
     sum / samples as f32

@@ -24,6 +24,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod bytes;
 pub mod caustic;
 pub mod classical;
 mod clusters;
@@ -33,6 +34,8 @@ pub mod flags;
 pub mod form_factor;
 pub mod gather;
 pub mod importance;
+pub mod journal;
+mod lights;
 pub mod patch_to_vertex;
 pub mod patches;
 pub mod reach;
@@ -40,11 +43,14 @@ pub mod refine;
 mod sites;
 mod smooth;
 pub mod solution;
+pub mod solution_file;
 pub mod solver;
 pub mod transport;
 
 mod solve;
 
 pub use importance::Importance;
+pub use journal::Journal;
+pub use lights::RelightError;
 pub use solution::{Report, Solution};
-pub use solve::{Config, Error, Progress, solve, solve_for};
+pub use solve::{Config, Error, Progress, solve, solve_for, solve_resumable};

@@ -9,15 +9,17 @@ use crate::element::{EdgeMarks, Elements, Side, VertexId, slot};
 use crate::field::Field;
 use crate::flags::{Flags, visible_weights};
 use crate::importance::Importance;
+use crate::journal::Journal;
 use crate::reach::Reach;
 use crate::solve::{Config, Progress};
 use crate::solver::{self, Convergence, Gain};
 use crate::transport::{Landing, Transport};
 use geometry::math::offset_origin;
 use geometry::sampling::Lattice2;
-use geometry::{Ray, Rgb, World, triangle};
+use geometry::{LightGroups, Ray, Rgb, World, triangle};
 use rayon::prelude::*;
 use std::collections::HashMap;
+use std::sync::Mutex;
 
 /// A midpoint this far (relative) from its prediction, at the finest mesh, marks its surroundings for a gather of
 /// their own in pass 2.
@@ -38,6 +40,8 @@ pub(crate) struct Refiner<'a> {
     pub(crate) world: &'a World,
     pub(crate) config: &'a Config,
     importance: Option<&'a Importance>,
+    /// Rows that were gathered before, and where they are kept.
+    pub(crate) journal: Option<&'a Mutex<Journal>>,
     pub(crate) progress: &'a dyn Progress,
     pub(crate) elements: Elements,
     pub(crate) reach: Reach,
@@ -46,6 +50,8 @@ pub(crate) struct Refiner<'a> {
     pub(crate) e: Vec<Rgb>,
     /// For each piece, whether any of it reflects diffusely: mirrors and glass need no irradiance.
     diffuse: Vec<bool>,
+    /// Lights whose parts are kept apart.
+    pub(crate) groups: Option<LightGroups>,
     /// Vertices whose surroundings the mesh does not resolve.
     pub(crate) unresolved: Vec<VertexId>,
     /// What an error matters at each slot, (0, 1]; empty where all matters alike.
@@ -62,6 +68,8 @@ pub(crate) struct Refiner<'a> {
 pub(crate) struct Solved {
     /// E at the sites, lx.
     pub(crate) e: Vec<Rgb>,
+    /// The parts of the groups of lights in it, where these are kept apart and the mesh is final.
+    pub(crate) parts: Vec<Vec<Rgb>>,
     /// Estimated variance of each (mean of the channels), lx².
     pub(crate) variance: Vec<f32>,
     pub(crate) convergence: Convergence,
@@ -88,6 +96,7 @@ impl<'a> Refiner<'a> {
         world: &'a World,
         config: &'a Config,
         importance: Option<&'a Importance>,
+        journal: Option<&'a Mutex<Journal>>,
         progress: &'a dyn Progress,
     ) -> Refiner<'a> {
         let scale = world.scale;
@@ -110,11 +119,13 @@ impl<'a> Refiner<'a> {
             world,
             config,
             importance,
+            journal,
             progress,
             elements,
             reach,
             field: Field::default(),
             e: Vec::new(),
+            groups: config.by_light.then(|| LightGroups::new(world)),
             unresolved: Vec::new(),
             weights: Vec::new(),
             h0,
@@ -431,17 +442,23 @@ impl<'a> Refiner<'a> {
     /// Solves on what there is, roughly: for predictions, not for pictures.
     fn settle(&mut self) {
         let tolerance = 0.02 * mean(&self.e).mean();
-        let settled = self.solved(tolerance, 12, &[], &Flags::default());
+        let settled = self.solved(tolerance, 12, &[], &[], &Flags::default());
         self.e = settled.e;
         self.field.sites.iter_mut().zip(settled.variance).for_each(|(site, v)| site.variance = v);
     }
 
     /// Solves E = D + K (E + extra) to `tolerance` lx from the present E, in at most `most` steps; also ‖K‖∞.
-    pub(crate) fn solved(&self, tolerance: f32, most: u32, extra: &[Rgb], flags: &Flags) -> Solved {
-        let usable = |s: usize| self.field.usable(s);
-        let transport = Transport::locate(&self.elements, &self.field, |node, side, w| {
-            visible_weights(self.world, &self.elements, flags, usable, node, side, w)
-        });
+    ///
+    /// - `extra_parts`: the parts of the groups of lights in `extra`; empty as that is.
+    pub(crate) fn solved(
+        &self,
+        tolerance: f32,
+        most: u32,
+        extra: &[Rgb],
+        extra_parts: &[Vec<Rgb>],
+        flags: &Flags,
+    ) -> Solved {
+        let transport = self.transport(flags);
         let norm = transport.norm();
         // While the mesh is being refined a rough bound will do.
         let gain = match flags.is_empty() {
@@ -451,7 +468,37 @@ impl<'a> Refiner<'a> {
         let (e, convergence) =
             solver::solve(self.e.clone(), gain, tolerance, most, |e| transport.apply(e, extra));
         let variance = transport.variance(&e);
-        Solved { e, variance, convergence, norm }
+        // Each group of lights by itself, on the same rows: E is their sum.
+        let settled = !flags.is_empty();
+        let groups = if settled { self.groups.as_ref().map_or(0, LightGroups::len) } else { 0 };
+        let parts = (0..groups)
+            .map(|g| {
+                let direct: Vec<Rgb> = self.field.sites.iter().map(|s| s.row.by_group[g]).collect();
+                let bound = tolerance * mean(&direct).mean() / self.mean_direct().max(1e-30);
+                let extra = extra_parts.get(g).map_or(&[][..], |part| part);
+                let apply = |e: &[Rgb]| {
+                    let mut sum = transport.reflect(e, extra);
+                    sum.iter_mut().zip(&direct).for_each(|(sum, &d)| *sum += d);
+                    sum
+                };
+                solver::solve(direct.clone(), gain, bound, most, apply).0
+            })
+            .collect();
+        Solved { e, parts, variance, convergence, norm }
+    }
+
+    /// The rows over the present mesh.
+    fn transport(&self, flags: &Flags) -> Transport<'_> {
+        let usable = |s: usize| self.field.usable(s);
+        let (world, elements) = (self.world, &self.elements);
+        Transport::locate(elements, &self.field, |node, side, w| {
+            visible_weights(world, elements, flags, usable, node, side, w)
+        })
+    }
+
+    /// Mean over sites of what comes back of emitters' light, lx.
+    fn mean_direct(&self) -> f32 {
+        mean(&self.field.sites.iter().map(|s| s.row.direct).collect::<Vec<_>>()).mean()
     }
 
     /// Where pass 2 should gather for itself.

@@ -4,14 +4,17 @@ use crate::element::{Side, VertexId, slot};
 use crate::field::Site;
 use crate::gather::{self, Origin};
 use crate::refine::{INWARD, Refiner, mean};
+use crate::solve::lock;
 use crate::transport::Row;
 use geometry::sampling::Lattice2;
-use geometry::{Rgb, triangle};
+use geometry::{LightGroups, Rgb, triangle};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
 /// Origins that one vertex's rays are shared among, at most.
 const FACETS: usize = 16;
+/// Rows in one record of a journal: what is lost when a solve is cut off.
+const RECORD: usize = 256;
 
 impl Refiner<'_> {
     /// Gathers at those sides of the vertices that are named, as far as light reaches them; connects the field anew.
@@ -82,26 +85,28 @@ impl Refiner<'_> {
         self.progress.stage("gathering", jobs.len() as u64);
         let dead =
             |t: u32, side: Side| self.elements.face(t).is_none_or(|face| !self.reach.alive(face, side));
-        jobs.par_iter()
-            .zip(&rays)
-            .map(|(&(vertex, side), &rays)| {
-                let turned = turned(&origins[&vertex], side);
-                let normal = self.elements.vertices[vertex as usize].normal * side.sign();
-                // Another number of rays draws other numbers: a row that is done again shares nothing with the first.
-                let stream = (u64::from(rays) << 40) ^ slot(vertex, side) as u64;
-                let row = gather::row(
-                    self.world,
-                    &turned,
-                    normal,
-                    &patterns[&rays],
-                    self.config.seed,
-                    stream,
-                    dead,
-                );
-                self.progress.advance(1);
-                row
-            })
-            .collect()
+        let gather = |(&(vertex, side), &rays): (&(VertexId, Side), &u32)| {
+            let turned = turned(&origins[&vertex], side);
+            let normal = self.elements.vertices[vertex as usize].normal * side.sign();
+            // Another number of rays draws other numbers: a row that is done again shares nothing with the first.
+            let stream = (u64::from(rays) << 40) ^ slot(vertex, side) as u64;
+            let (pattern, seed) = (&patterns[&rays], self.config.seed);
+            let row =
+                gather::row(self.world, &turned, normal, pattern, seed, stream, dead, self.groups.as_ref());
+            self.progress.advance(1);
+            row
+        };
+        let Some(journal) = self.journal else { return jobs.par_iter().zip(&rays).map(gather).collect() };
+        let mut rows = Vec::with_capacity(jobs.len());
+        for (jobs, rays) in jobs.chunks(RECORD).zip(rays.chunks(RECORD)) {
+            let known = lock(journal).recall(jobs.len());
+            rows.extend(known.unwrap_or_else(|| {
+                let new: Vec<Row> = jobs.par_iter().zip(rays).map(gather).collect();
+                lock(journal).keep(&new);
+                new
+            }));
+        }
+        rows
     }
 
     /// For each of `vertices`, points just inside the facets around it.
@@ -143,7 +148,8 @@ impl Refiner<'_> {
             let origins = [Origin { position: middle, ng: ng * side.sign() }];
             let stream = (1 << 62) | slot(leaf, side) as u64;
             let normal = smooth * side.sign();
-            let row = gather::row(self.world, &origins, normal, pattern, self.config.seed, stream, dead);
+            let row =
+                gather::row(self.world, &origins, normal, pattern, self.config.seed, stream, dead, None);
             if row.dead > 0.5 {
                 return false; // the middle is buried
             }
@@ -167,29 +173,33 @@ impl Refiner<'_> {
         })
     }
 
-    /// Direct irradiance at every slot, lx: `samples` light samples at each site.
-    pub(crate) fn direct(&self, samples: u32) -> Vec<Rgb> {
+    /// Direct irradiance at every site, lx, by `samples` light samples; and the parts of each group of lights, where these
+    /// are kept apart.
+    pub(crate) fn direct(&self, samples: u32) -> (Vec<Rgb>, Vec<Vec<Rgb>>) {
         let origins = self.origins(self.field.sites.iter().map(|s| s.vertex));
-        let at_sites: Vec<Rgb> = self
+        let groups = self.groups.as_ref();
+        let count = groups.map_or(0, LightGroups::len);
+        let at_sites: Vec<(Rgb, Vec<Rgb>)> = self
             .field
             .sites
             .par_iter()
             .map(|site| {
+                let mut parts = vec![Rgb::BLACK; count];
                 let v = &self.elements.vertices[site.vertex as usize];
-                let Some(origins) = origins.get(&site.vertex) else { return Rgb::BLACK };
+                let Some(origins) = origins.get(&site.vertex) else { return (Rgb::BLACK, parts) };
                 let turned = turned(origins, site.side);
-                let stream = slot(site.vertex, site.side) as u64;
-                gather::direct(
-                    self.world,
-                    &turned,
-                    v.normal * site.side.sign(),
-                    samples,
-                    self.config.seed,
-                    stream,
-                )
+                let (normal, stream) = (v.normal * site.side.sign(), slot(site.vertex, site.side) as u64);
+                let lit = |light, brought| {
+                    if let Some(groups) = groups {
+                        parts[groups.of_light(light)] += brought;
+                    }
+                };
+                let all = gather::direct(self.world, &turned, normal, samples, self.config.seed, stream, lit);
+                (all, parts)
             })
             .collect();
-        self.field.spread(&at_sites)
+        let parts = (0..count).map(|g| at_sites.iter().map(|s| s.1[g]).collect()).collect();
+        (at_sites.iter().map(|s| s.0).collect(), parts)
     }
 }
 

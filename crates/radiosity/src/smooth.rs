@@ -70,10 +70,26 @@ impl Graph {
     }
 }
 
-/// E at the sites with less noise: see the head of this file.
+/// For each site those whose values make up its own with less noise, and their weights: see the head of this file. None
+/// where its own value stands.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Smoothing(Vec<Vec<(u32, f32)>>);
+
+impl Smoothing {
+    /// Values at the sites with less noise: all of them, or a part of the light that they are made up of.
+    pub(crate) fn apply(&self, e: &[Rgb]) -> Vec<Rgb> {
+        let value = |(own, fit): (&Rgb, &Vec<(u32, f32)>)| match fit.as_slice() {
+            [] => *own,
+            fit => fit.iter().map(|&(s, w)| e[s as usize] * w).sum::<Rgb>().max(Rgb::BLACK),
+        };
+        e.par_iter().zip(&self.0).map(value).collect()
+    }
+}
+
+/// How the present values at the sites are to be smoothed.
 ///
 /// - `variance`: of each site's value (mean of the channels), lx².
-pub(crate) fn smoothed(refiner: &Refiner, flags: &Flags, variance: &[f32]) -> Vec<Rgb> {
+pub(crate) fn smoothing(refiner: &Refiner, flags: &Flags, variance: &[f32]) -> Smoothing {
     let graph = Graph::new(refiner, flags);
     // A site's own rays are poor witnesses of their noise: those that missed the bright patch know nothing of it. What
     // its neighbours saw counts as well.
@@ -84,24 +100,29 @@ pub(crate) fn smoothed(refiner: &Refiner, flags: &Flags, variance: &[f32]) -> Ve
         })
         .collect();
     let level = crate::refine::mean(&refiner.e).mean();
-    (0..refiner.e.len() as u32)
-        .into_par_iter()
-        .map(|site| fit(refiner, &refiner.field, &graph, &pooled, level, site))
-        .collect()
+    let fit = |site| fit(refiner, &refiner.field, &graph, &pooled, level, site);
+    Smoothing((0..refiner.e.len() as u32).into_par_iter().map(fit).collect())
 }
 
-/// The site's value by the widest fit that agrees with the narrower ones.
-fn fit(refiner: &Refiner, field: &Field, graph: &Graph, variance: &[f32], level: f32, site: u32) -> Rgb {
+/// The weights of the widest fit that agrees with the narrower ones.
+fn fit(
+    refiner: &Refiner,
+    field: &Field,
+    graph: &Graph,
+    variance: &[f32],
+    level: f32,
+    site: u32,
+) -> Vec<(u32, f32)> {
     let own = refiner.e[site as usize];
     // What gathered next to nothing lies in the dark, behind a wall perhaps: no light may come to it from beyond.
     if own.mean() <= 0.05 * level {
-        return own;
+        return Vec::new();
     }
     let around = around(refiner, field, graph, site);
     let at = |s: u32| &refiner.elements.vertices[field.sites[s as usize].vertex as usize];
     let here = at(site);
     let (tangent, bitangent) = frame(here.normal);
-    let mut believed = own;
+    let mut believed = Vec::new();
     // Every fit so far: its value (mean of the channels) and variance.
     let mut fits: Vec<(f32, f32)> = vec![(own.mean(), variance[site as usize])];
     for reach in REACHES {
@@ -138,9 +159,9 @@ fn fit(refiner: &Refiner, field: &Field, graph: &Graph, variance: &[f32], level:
             break;
         }
         fits.push((value.mean(), noise));
-        believed = value;
+        believed = rows.iter().map(|(s, w, x)| (*s, weight(*w, x) as f32)).collect();
     }
-    believed.max(Rgb::BLACK)
+    believed
 }
 
 /// The site and those around it that face alike, by distance (m), as far as they hang together; enough for the widest fit.

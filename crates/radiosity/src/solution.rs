@@ -2,7 +2,9 @@
 
 use crate::caustic::Caustics;
 use crate::element::{Elements, Side, slot};
+use crate::field::Sources;
 use crate::flags::{Flags, visible_weights};
+use crate::lights::Lights;
 use crate::refine::Refiner;
 use crate::solver::Convergence;
 use geometry::{Hit, Ray, Rgb, Surface, Vec3, World};
@@ -11,19 +13,34 @@ use rayon::prelude::*;
 /// The solved prepass: indirect irradiance everywhere on the scene's surfaces. It belongs to the world it was solved for.
 #[derive(Clone, Debug)]
 pub struct Solution {
-    elements: Elements,
+    pub(crate) elements: Elements,
     /// Indirect irradiance at each slot, lx; zero where a slot is not usable.
     values: Vec<Rgb>,
     usable: Vec<bool>,
-    flags: Flags,
+    pub(crate) flags: Flags,
     /// Direct irradiance at each slot, lx: for the `vertex` mode and for baking.
     direct: Vec<Rgb>,
     /// Photons' irradiance at each slot, lx; empty when there are none.
     caustic_values: Vec<Rgb>,
     /// Light by way of mirrors and glass alone.
     pub caustics: Caustics,
+    /// What the slots' values are made from, where there are sites.
+    pub(crate) at_sites: Option<AtSites>,
     /// How the solve went.
     pub report: Report,
+}
+
+/// Values where they were gathered.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct AtSites {
+    /// How each slot draws on them.
+    pub sources: Sources,
+    /// Indirect irradiance, lx.
+    pub indirect: Vec<Rgb>,
+    /// Direct irradiance, lx.
+    pub direct: Vec<Rgb>,
+    /// The same by groups of lights, where these are kept apart.
+    pub lights: Option<Lights>,
 }
 
 /// How a solve went.
@@ -131,21 +148,33 @@ impl Solution {
     pub(crate) fn new(
         refiner: Refiner,
         flags: Flags,
-        extra: Vec<Rgb>,
         direct: Vec<Rgb>,
+        lights: Option<Lights>,
         caustics: Caustics,
         report: Report,
     ) -> Solution {
-        let values = refiner.field.spread(&refiner.e);
-        let usable = (0..refiner.field.slots()).into_par_iter().map(|s| refiner.field.usable(s)).collect();
+        let at_sites = AtSites { sources: refiner.field.sources, indirect: refiner.e, direct, lights };
+        Solution::of_sites(refiner.elements, flags, at_sites, caustics, report)
+    }
+
+    /// From values at sites.
+    pub(crate) fn of_sites(
+        elements: Elements,
+        flags: Flags,
+        at_sites: AtSites,
+        caustics: Caustics,
+        report: Report,
+    ) -> Solution {
+        let sources = &at_sites.sources;
         Solution {
-            elements: refiner.elements,
-            values,
-            usable,
+            values: sources.spread(&at_sites.indirect),
+            usable: (0..sources.0.len()).into_par_iter().map(|s| sources.usable(s)).collect(),
+            direct: sources.spread(&at_sites.direct),
+            caustic_values: caustics.at_vertices(&elements, |slot| sources.usable(slot)),
+            elements,
             flags,
-            direct,
-            caustic_values: extra,
             caustics,
+            at_sites: Some(at_sites),
             report,
         }
     }
@@ -168,6 +197,7 @@ impl Solution {
             direct,
             caustic_values,
             caustics,
+            at_sites: None,
             report,
         }
     }

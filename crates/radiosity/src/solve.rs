@@ -2,10 +2,13 @@
 
 use crate::caustic::Caustics;
 use crate::importance::Importance;
+use crate::journal::Journal;
+use crate::lights::Lights;
 use crate::refine::{Refiner, Solved, mean};
 use crate::smooth;
 use crate::solution::{Report, Solution};
-use geometry::World;
+use geometry::{LightGroups, Rgb, World};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use thiserror::Error;
 
 /// What the prepass may cost and how exact it is to be. Lengths are in units of the size of its rooms, [`World::scale`].
@@ -37,6 +40,8 @@ pub struct Config {
     pub light_samples: u32,
     /// Particles sent for caustics.
     pub photons: usize,
+    /// Whether to keep the light of each group of lamps apart, so that they can be dimmed afterwards.
+    pub by_light: bool,
     /// Same seed, same solution.
     pub seed: u64,
 }
@@ -61,6 +66,7 @@ impl Config {
             solve_tolerance: 0.1 * error,
             light_samples: 64,
             photons: ((4000.0 / (error * error).max(1e-6)) as usize).clamp(100_000, 4_000_000),
+            by_light: false,
             seed: 0,
         }
     }
@@ -92,6 +98,11 @@ pub enum Error {
         /// What it may take.
         most: u64,
     },
+}
+
+/// A journal that a thread left behind when it panicked holds whole records all the same.
+pub(crate) fn lock(journal: &Mutex<Journal>) -> MutexGuard<'_, Journal> {
+    journal.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Hears how far the work is, and may end it early.
@@ -127,21 +138,62 @@ pub fn solve_for(
     importance: Option<&Importance>,
     progress: &dyn Progress,
 ) -> Result<Solution, Error> {
-    let mut refiner = Refiner::start(world, config, importance, progress);
+    solve_resumable(world, config, importance, None, progress)
+}
+
+/// The same, with the rows kept in a journal: a solve that was cut off goes on from there, to the same solution.
+pub fn solve_resumable(
+    world: &World,
+    config: &Config,
+    importance: Option<&Importance>,
+    journal: Option<&Mutex<Journal>>,
+    progress: &dyn Progress,
+) -> Result<Solution, Error> {
+    if let Some(journal) = journal {
+        let told =
+            format!("{} {config:?} {:?} {importance:?}", env!("CARGO_PKG_VERSION"), world.scene.emissions());
+        let mut key = blake3::Hasher::new();
+        key.update(&world.scene.fingerprint()).update(told.as_bytes());
+        lock(journal).begin(key.finalize().as_bytes());
+    }
+    let mut refiner = Refiner::start(world, config, importance, journal, progress);
     refiner.refine();
     progress.stage("caustics", 1);
-    let caustics = Caustics::trace(world, &refiner.elements, config.photons, config.seed);
-    let extra = caustics.at_vertices(&refiner.elements, &refiner.field);
+    let groups = refiner.groups.as_ref();
+    let caustics = Caustics::trace_groups(world, &refiner.elements, config.photons, config.seed, groups);
+    let usable = |slot| refiner.field.usable(slot);
+    let extra = caustics.at_vertices(&refiner.elements, usable);
+    let extra_parts: Vec<Vec<Rgb>> = (0..groups.map_or(0, LightGroups::len))
+        .map(|g| caustics.part_at_vertices(&refiner.elements, usable, g))
+        .collect();
     progress.stage("solving", 1);
     let flags = refiner.flags();
     let tolerance = config.solve_tolerance * mean(&refiner.e).mean();
-    let Solved { e, variance, convergence, norm } = refiner.solved(tolerance, 500, &extra, &flags);
+    let Solved { e, parts, variance, convergence, norm } =
+        refiner.solved(tolerance, 500, &extra, &extra_parts, &flags);
     if !e.iter().all(|e| e.is_finite()) {
         return Err(Error::Diverged { iterations: convergence.iterations, norm });
     }
     refiner.e = e;
-    refiner.e = smooth::smoothed(&refiner, &flags, &variance);
-    let direct = refiner.direct(config.light_samples);
-    let report = Report::new(world, &refiner, &flags, &extra, &direct, convergence, norm, &caustics);
-    Ok(Solution::new(refiner, flags, extra, direct, caustics, report))
+    let smoothing = smooth::smoothing(&refiner, &flags, &variance);
+    refiner.e = smoothing.apply(&refiner.e);
+    let parts = parts.iter().map(|part| smoothing.apply(part)).collect();
+    let (direct, direct_parts) = refiner.direct(config.light_samples);
+    let report = Report::new(
+        world,
+        &refiner,
+        &flags,
+        &extra,
+        &refiner.field.spread(&direct),
+        convergence,
+        norm,
+        &caustics,
+    );
+    let lights = refiner.groups.take().map(|groups| Lights {
+        groups,
+        emissions: world.scene.emissions(),
+        indirect: parts,
+        direct: direct_parts,
+    });
+    Ok(Solution::new(refiner, flags, direct, lights, caustics, report))
 }

@@ -15,11 +15,11 @@ use rayon::prelude::*;
 #[derive(Clone, Copy, Debug)]
 pub struct Landing {
     /// Scene triangle; the top bit is set for its back.
-    triangle: u32,
+    pub(crate) triangle: u32,
     /// Barycentrics in units of 1/65535.
-    uv: [u16; 2],
+    pub(crate) uv: [u16; 2],
     /// Reflectance met, times what mirrors and glass on the way left, over the number of rays.
-    weight: [f16; 3],
+    pub(crate) weight: [f16; 3],
 }
 
 const BACK: u32 = 1 << 31;
@@ -56,6 +56,8 @@ impl Landing {
 pub struct Row {
     /// Irradiance that comes back from the surfaces met, of the light that emitters throw on them directly, lx.
     pub direct: Rgb,
+    /// Its parts by groups of lights, where these are kept apart.
+    pub by_group: Box<[Rgb]>,
     /// The rest of what comes back, as multiples of E where the rays landed.
     pub landings: Box<[Landing]>,
     /// Share of the rays that first met a side that light cannot reach.

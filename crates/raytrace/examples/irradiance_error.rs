@@ -170,12 +170,13 @@ fn truths(
                 let brought = |wi: Vec3, rng: &mut Rng| {
                     let mut reflected = Rgb::BLACK;
                     let ray = Ray::new(offset_origin(s.position, s.ng), wi);
-                    let followed = gather::follow(world, ray, rng, |hit, side, weight| {
+                    let land = |hit: &Hit, side, weight| {
                         let (t, u, v) = (hit.triangle, hit.u, hit.v);
                         let e = solution.irradiance(world, t, u, v, side)
                             + solution.caustic(world, t, u, v, side);
                         reflected = weight * e;
-                    });
+                    };
+                    let followed = gather::follow(world, ray, rng, land, |_, _| ());
                     followed.direct + reflected
                 };
                 let sum: Rgb = (0..rays)
@@ -186,7 +187,7 @@ fn truths(
                 sum / rays as f32
             };
             let origin = [Origin { position: s.position, ng: s.ng }];
-            [half(0), half(1), gather::direct(world, &origin, s.ns, 256, 1, i as u64)]
+            [half(0), half(1), gather::direct(world, &origin, s.ns, 256, 1, i as u64, |_, _| ())]
         })
         .collect();
     let line = |t: &Truth| t.map(|c| format!("{} {} {}", c.r, c.g, c.b)).join(" ");

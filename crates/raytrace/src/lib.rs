@@ -21,14 +21,16 @@
 //!     gather_rays: None,
 //!     samples: None,
 //!     verify: true,
+//!     by_light: false,
 //! };
 //! // Without a solution it makes its own; for many views, pass that of `prepass`.
 //! let outcome = render(&world, &room.cameras[0], None, &settings, &())?;
-//! exr::write(&outcome.film, &exr::Metadata::default(), "cornell.exr".as_ref())?;
+//! exr::write(&outcome.film, &[], &exr::Metadata::default(), "cornell.exr".as_ref())?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod adaptive;
+pub mod by_light;
 pub mod difference;
 pub mod direct;
 pub mod effort;
@@ -46,8 +48,10 @@ pub mod render;
 pub mod tonemap;
 pub mod verify;
 
+pub use by_light::render_by_light;
 pub use error::Error;
 pub use film::{Film, Pixel};
 pub use render::{
-    DiffuseMode, Integrator, Outcome, Progress, Report, Settings, prepass, prepass_for, render,
+    DiffuseMode, Integrator, Outcome, Progress, Report, Settings, prepass, prepass_for, prepass_resumable,
+    render,
 };

@@ -15,8 +15,9 @@ use crate::pixel::{View, over_pixels};
 use crate::plan::Plan;
 use crate::verify::{Judgement, Probes, Verdict};
 use geometry::sampling::Lattice2;
-use geometry::{Camera, World};
-use radiosity::{Config, Solution, classical};
+use geometry::{Camera, Rgb, World};
+use radiosity::{Config, Journal, Solution, classical};
+use std::sync::Mutex;
 use std::time::Instant;
 
 pub use radiosity::Progress;
@@ -69,6 +70,8 @@ pub struct Settings {
     pub samples: Option<u32>,
     /// Whether to measure the picture's error by probes, and to go on where it is missed.
     pub verify: bool,
+    /// Whether the prepass keeps the light of each group of lamps apart.
+    pub by_light: bool,
 }
 
 /// Of the square of the error asked, the share that samples may leave as noise; the rest is for the first pass.
@@ -82,8 +85,8 @@ const MOST_REPAIRS: u32 = 2;
 /// An error is missed by so much more than it seems, for the next step is not known exactly.
 const MARGIN: f32 = 0.8;
 /// Rays for the probes at most: so many, and this share of what both passes took.
-const PROBE_RAYS: u64 = 300_000;
-const PROBE_SHARE: u64 = 4;
+pub(crate) const PROBE_RAYS: u64 = 300_000;
+pub(crate) const PROBE_SHARE: u64 = 4;
 
 /// How a render went.
 #[derive(Clone, Debug, Default)]
@@ -103,6 +106,8 @@ pub struct Report {
 pub struct Outcome {
     /// The picture; a pixel with 0 samples was not reached, and a film of nothing else is not worth a file.
     pub film: Film,
+    /// What each group of lamps adds to the picture, cd/m², where that was asked; they sum to it.
+    pub by_light: Vec<(String, Vec<Rgb>)>,
     /// Whether it is what was asked; false when the time was up or someone stopped it.
     pub finished: bool,
     /// How it went.
@@ -152,7 +157,22 @@ pub fn prepass_for(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Solution, radiosity::Error> {
-    let mut config = Config { seed: settings.seed, ..Config::for_error(MESH_SHARE * settings.error) };
+    prepass_resumable(world, cameras, settings, None, progress)
+}
+
+/// The same with a journal: one that was cut off goes on from there.
+pub fn prepass_resumable(
+    world: &World,
+    cameras: &[Camera],
+    settings: &Settings,
+    journal: Option<&Mutex<Journal>>,
+    progress: &dyn Progress,
+) -> Result<Solution, radiosity::Error> {
+    let mut config = Config {
+        seed: settings.seed,
+        by_light: settings.by_light,
+        ..Config::for_error(MESH_SHARE * settings.error)
+    };
     if let Some(rays) = settings.gather_rays {
         config.rays = rays;
     }
@@ -169,7 +189,7 @@ pub fn prepass_for(
     }
     let aspect = settings.width as f32 / settings.height.max(1) as f32;
     let matters = (!cameras.is_empty()).then(|| importance(world, cameras, aspect));
-    radiosity::solve_for(world, &config, matters.as_ref(), &watch)
+    radiosity::solve_resumable(world, &config, matters.as_ref(), journal, &watch)
 }
 
 /// Renders `world` as `camera` sees it. The hybrid integrator needs the `solution` of [`prepass`]; without one it is made here.
@@ -188,7 +208,7 @@ pub fn render(
             let (film, finished) = trace_paths(world, &view, spp, settings.seed, &watch);
             let report =
                 Report { stages: vec![("image", start.elapsed().as_secs_f64())], ..Report::default() };
-            Ok(Outcome { film, finished, report })
+            Ok(Outcome { film, by_light: Vec::new(), finished, report })
         }
         Integrator::Hybrid => two_passes(world, &view, solution, settings, &watch),
     }
@@ -264,7 +284,7 @@ fn two_passes(
                 report.texts.push(("error measured".into(), verdict.to_string()));
             }
             report.texts.push(("noise".into(), format!("{:.2} % estimated", 100.0 * noise)));
-            return Ok(Outcome { film, finished, report });
+            return Ok(Outcome { film, by_light: Vec::new(), finished, report });
         };
         let finer = Settings { error: finer_mesh, ..settings.clone() };
         made = Some(prepass_for(world, cameras, &finer, watch.progress)?);
@@ -306,7 +326,7 @@ fn budget(settings: &Settings, goal: f32) -> Budget {
 }
 
 /// What the prepass found, for the file and the user.
-fn facts(r: &radiosity::Report) -> Vec<(String, String)> {
+pub(crate) fn facts(r: &radiosity::Report) -> Vec<(String, String)> {
     let c = &r.convergence;
     let state = if c.converged { "converged" } else { "not converged" };
     let (what, shape) =

@@ -3,13 +3,16 @@
 mod compare;
 mod inspect;
 mod render;
+mod solve;
 
 pub use compare::CompareArgs;
 pub use inspect::InspectArgs;
 pub use render::{DiffuseArg, IntegratorArg, RenderArgs, SolverArg};
+pub use solve::SolveArgs;
 
 use crate::values::{self, SkyValue};
 use clap::{Args, Parser, Subcommand};
+use geometry::Rgb;
 
 /// Render glTF rooms in physical units: radiosity once, rays for the rest.
 #[derive(Debug, Parser)]
@@ -34,6 +37,8 @@ pub struct Cli {
 pub enum Command {
     /// Render a scene to an EXR file with its layers, in cd/m2
     Render(Box<RenderArgs>),
+    /// Solve a room's indirect light once, for any view of it, into a file
+    Solve(SolveArgs),
     /// Show what is in a scene, what lights it, and what is wrong with it
     Inspect(InspectArgs),
     /// Measure how far a picture is from a reference
@@ -54,9 +59,12 @@ pub struct WhichArgs {
     pub time: Option<f32>,
 }
 
-/// Light from beyond the scene.
-#[derive(Clone, Debug, Args)]
-pub struct SkyArgs {
+/// What shines, beside and instead of what the file says.
+#[derive(Clone, Debug, Default, Args)]
+pub struct LightArgs {
+    /// Make the lamps of this name (of light, emissive material, or `sky`) so many times as bright: 0 is off; R,G,B tints
+    #[arg(long = "light", value_name = "NAME=FACTOR", value_parser = values::light)]
+    pub lights: Vec<(String, Rgb)>,
     /// Light from beyond the scene: a panorama (.hdr, .exr) or an even radiance in cd/m2, V or R,G,B
     #[arg(long, value_name = "FILE|R,G,B", value_parser = values::sky)]
     pub sky: Option<SkyValue>,

@@ -1,6 +1,6 @@
 //! `twolight render`.
 
-use super::{RunArgs, SkyArgs, WhichArgs};
+use super::{LightArgs, RunArgs, WhichArgs};
 use crate::values;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
@@ -15,6 +15,8 @@ Examples:
   twolight render room.glb -o room.exr --preview room.png    also a picture to look at
   twolight render room.glb -o room.exr --camera all          room.Kitchen.exr, room.Hall.exr, ...
   twolight render room.glb -o room.exr --time-limit 60s      the best that a minute gives
+  twolight render room.glb -o room.exr --solution room.twl   what `twolight solve` found, for another view
+  twolight render room.glb -o room.exr --light Lamp=0.5,0.4,0.3   dimmed and tinted
   twolight render room.glb -o room.exr --sky 1000            an even sky of 1000 cd/m2, if no lamp is in the file
   twolight render room.glb -o ref.exr --integrator path --spp 4096
   twolight render room.glb -o room.exr --solver progressive --diffuse vertex --snapshots --preview room.png
@@ -45,14 +47,17 @@ pub struct RenderArgs {
     /// Pixels across; the camera's aspect gives the height
     #[arg(long, value_name = "W", value_parser = clap::value_parser!(u32).range(1..))]
     pub width: Option<u32>,
-    /// Error to aim at: the one knob of quality, which sets rays, mesh and samples
-    #[arg(long, value_name = "PERCENT", default_value = "2%", value_parser = values::share)]
-    pub error: f32,
+    /// Error to aim at: the one knob of quality, which sets rays, mesh and samples; 2 % if absent, or that of the solution
+    #[arg(long, value_name = "PERCENT", value_parser = values::share)]
+    pub error: Option<f32>,
+    /// Take the indirect light from this file, made by `solve`
+    #[arg(long, value_name = "ROOM.twl")]
+    pub solution: Option<PathBuf>,
     /// Stop after this time with what there is: 60s, 5m, 1h
     #[arg(long, value_name = "TIME", value_parser = values::duration)]
     pub time_limit: Option<Duration>,
     #[command(flatten)]
-    pub sky: SkyArgs,
+    pub light: LightArgs,
     /// How the light is found
     #[arg(long, value_enum, default_value_t = IntegratorArg::Hybrid, help_heading = "Methods")]
     pub integrator: IntegratorArg,
@@ -87,6 +92,9 @@ pub struct RenderArgs {
     /// without radiosity side by side
     #[arg(long, help_heading = "Classical radiosity")]
     pub snapshots: bool,
+    /// Also write what each lamp adds, as layers light.NAME of the EXR, which sum to the picture
+    #[arg(long)]
+    pub light_layers: bool,
     /// Rays from each vertex (or patch), in place of what --error asks for
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Methods")]
     pub gather_rays: Option<u32>,

@@ -4,6 +4,7 @@ pub mod compare;
 pub mod inspect;
 pub mod render;
 mod snapshots;
+pub mod solve;
 
 use std::io::{ErrorKind, Write};
 

@@ -2,15 +2,15 @@
 
 use super::{print, snapshots};
 use crate::args::RenderArgs;
-use crate::cameras;
 use crate::job::{RenderJob, with_name};
 use crate::progress::Bars;
 use crate::room::{Room, lap, start_threads};
+use crate::{cameras, solutions};
 use anyhow::{Context, Result};
 use geometry::Camera;
 use raytrace::exr::Metadata;
 use raytrace::verify::{Judgement, Verdict};
-use raytrace::{Integrator, Outcome, Settings, exr, prepass_for, render, tonemap};
+use raytrace::{Integrator, Outcome, Settings, exr, prepass_for, render, render_by_light, tonemap};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -27,7 +27,8 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
     start_threads(job.threads)?;
     bars.listen_for_interrupts();
 
-    let Room { world, cameras, warnings, stages } = Room::open(&job.scene, &job.which, &job.sky, &bars)?;
+    let Room { mut world, cameras, warnings, stages } =
+        Room::open(&job.scene, &job.which, &job.light, &bars)?;
     // What all pictures share is told with the first.
     let mut shared = stages;
     let choice = cameras::choose(job.camera.as_deref(), &cameras, &world.scene)?;
@@ -37,16 +38,28 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
     let mut clock = Instant::now();
     let several = job.camera.as_deref() == Some("all");
     let mut pictures = Vec::new();
-    let (mut solution, mut rays_before, mut missed) = (None, 0, false);
+    let (mut rays_before, mut missed) = (0, false);
+    let (mut solution, about) = match &job.solution {
+        Some(path) => solutions::read(path, &world).map(|(solution, about)| (Some(solution), Some(about)))?,
+        None => (None, None),
+    };
+    let error = job.error(about.as_ref());
+    if let Some(about) = about {
+        shared.push(("solution", lap(&mut clock)));
+        if error < about.error {
+            let [asked, made] = [error, about.error].map(|e| (100.0 * e).to_string());
+            bars.note(&format!("note: {asked} % is asked, and the solution was made for {made} %"));
+        }
+    }
     for camera in &choice.cameras {
         let path = |base: &Path| if several { with_name(base, &camera.name) } else { base.to_path_buf() };
         let (output, preview) = (path(&job.output), job.preview.as_deref().map(path));
-        let settings = job.settings(camera)?;
+        let settings = job.settings(camera, error)?;
         if settings.integrator == Integrator::Hybrid && solution.is_none() {
             // Light does not know where we stand: one solution serves all views.
             solution = Some(match &job.classical {
                 Some(config) if job.snapshots => {
-                    let (solution, on_the_way) = snapshots::take(&job, &world, camera, config, &bars)?;
+                    let (solution, on_the_way) = snapshots::take(&job, &world, camera, config, error, &bars)?;
                     pictures.extend(on_the_way);
                     solution
                 }
@@ -55,7 +68,10 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
             });
             shared.push(("prepass", lap(&mut clock)));
         }
-        let mut outcome = render(&world, camera, solution.as_ref(), &settings, &bars)?;
+        let mut outcome = match job.light_layers {
+            true => render_by_light(&mut world, camera, solution.as_ref(), &settings, &bars)?,
+            false => render(&world, camera, solution.as_ref(), &settings, &bars)?,
+        };
         outcome.report.stages.append(&mut shared);
         let rays = world.bvh.rays_cast();
         let rays = rays - std::mem::replace(&mut rays_before, rays);
@@ -193,8 +209,8 @@ pub(super) fn save(
     rays: u64,
 ) -> Result<Picture> {
     let started = Instant::now();
-    let Outcome { film, finished, report, .. } = outcome;
-    exr::write(&film, &metadata(camera, settings, finished, &report.texts), &output)?;
+    let Outcome { film, by_light, finished, report } = outcome;
+    exr::write(&film, &by_light, &metadata(camera, settings, finished, &report.texts), &output)?;
     let mut exposure = None;
     if let Some(path) = &preview {
         let beauty = film.beauty();

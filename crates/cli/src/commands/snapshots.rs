@@ -18,6 +18,7 @@ pub fn take(
     world: &World,
     camera: &Camera,
     config: &Config,
+    error: f32,
     bars: &Bars,
 ) -> Result<(Solution, Vec<Picture>)> {
     let room = Room::new(world, config, bars);
@@ -30,7 +31,7 @@ pub fn take(
         if shooting.shots < shots || bars.stopped() {
             return Ok((solution, pictures));
         }
-        let settings = job.settings(camera)?;
+        let settings = job.settings(camera, error)?;
         let outcome = render(world, camera, Some(&solution), &settings, bars)?;
         let path = |base: &PathBuf| with_name(base, &format!("shots-{shots:05}"));
         let (output, preview) = (path(&job.output), job.preview.as_ref().map(path));

@@ -12,9 +12,9 @@ pub struct Node {
     /// Its corners.
     pub vertices: [VertexId; 3],
     /// First of its two children; 0 for a leaf (node 0 is a root, never a child).
-    child: u32,
+    pub(crate) child: u32,
     /// The edge from corner `edge` to the next one is the one that was split.
-    edge: u8,
+    pub(crate) edge: u8,
 }
 
 impl Node {

@@ -15,7 +15,14 @@ use std::path::Path;
 /// Beauty is R, G, B, A without a prefix, so that every viewer shows it; then `direct`, `indirect`, `specular`,
 /// `emission` (their sum is the beauty), `albedo`, `irradiance` as .R .G .B, `normal` and `position` as .X .Y .Z,
 /// `depth.Z` and `variance.Y`. Light is in cd/m², irradiance in lx, lengths in metres.
-pub fn write(film: &Film, metadata: &Metadata, path: &Path) -> std::result::Result<(), Error> {
+///
+/// - `by_light`: what each group of lamps adds to the beauty, as layers `light.NAME`.
+pub fn write(
+    film: &Film,
+    by_light: &[(String, Vec<Rgb>)],
+    metadata: &Metadata,
+    path: &Path,
+) -> std::result::Result<(), Error> {
     type Get = fn(&Pixel) -> [f32; 3];
     const RGB: [&str; 3] = ["R", "G", "B"];
     const XYZ: [&str; 3] = ["X", "Y", "Z"];
@@ -36,6 +43,12 @@ pub fn write(film: &Film, metadata: &Metadata, path: &Path) -> std::result::Resu
     });
     for (name, names, format, get) in triples {
         channels.extend(layer(names.map(|c| format!("{name}.{c}")), format, n, |i| get(&film.pixels[i])));
+    }
+    for (name, part) in by_light {
+        // A point divides a layer's name from its channel's.
+        let name = name.replace('.', "_");
+        let names = RGB.map(|c| format!("light.{name}.{c}"));
+        channels.extend(layer(names, Format::Fitting, n, |i| part[i].to_array()));
     }
     channels.extend(layer(["depth.Z"], Format::Float, n, |i| [film.pixels[i].depth]));
     channels.extend(layer(["variance.Y"], Format::Fitting, n, |i| [film.pixels[i].variance]));

@@ -11,7 +11,7 @@ use crate::render::DiffuseMode;
 use geometry::bsdf::BsdfSample;
 use geometry::math::{offset_origin, to_world};
 use geometry::sampling::{Lattice2, Rng, cosine_hemisphere};
-use geometry::{Ray, Rgb, Surface, Vec3, World, optics, photometry};
+use geometry::{Hit, Ray, Rgb, Surface, Vec3, World, optics, photometry};
 use radiosity::Solution;
 use radiosity::element::Side;
 use radiosity::gather::{self, ROUGH};
@@ -234,11 +234,12 @@ impl Hybrid<'_> {
             }
             let ray = Ray::new(offset_origin(surface.position, surface.ng), wi);
             let mut reflected = Rgb::BLACK;
-            let followed = gather::follow(self.world, ray, rng, |hit, side, weight| {
+            let land = |hit: &Hit, side, weight| {
                 let e = self.solution.irradiance(self.world, hit.triangle, hit.u, hit.v, side)
                     + self.solution.caustic(self.world, hit.triangle, hit.u, hit.v, side);
                 reflected += weight * e;
-            });
+            };
+            let followed = gather::follow(self.world, ray, rng, land, |_, _| ());
             let brought = followed.direct + reflected;
             sum += brought;
             square += brought.luminance() * brought.luminance();

@@ -1,0 +1,116 @@
+//! The picture as a sum of pictures, one for each group of lamps: to be dimmed and tinted afterwards, in any program.
+
+use crate::film::{Film, Pixel};
+use crate::pixel::View;
+use crate::render::{
+    Integrator, Outcome, PROBE_RAYS, PROBE_SHARE, Progress, Report, Settings, facts, render,
+};
+use crate::verify::Probes;
+use geometry::light_groups::OTHERS;
+use geometry::{Camera, LightGroups, Rgb, Scene, World};
+use radiosity::Solution;
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+/// Name of the layer of surfaces that show without being lit (KHR_materials_unlit).
+pub const UNLIT: &str = "unlit";
+
+/// Renders what each group of lamps adds, one after the other, and the sum of it all; each is as exact by itself as the
+/// picture is to be. In the end the world shines as before.
+///
+/// - `solution`: made with [`Settings::by_light`]; not needed for paths.
+pub fn render_by_light(
+    world: &mut World,
+    camera: &Camera,
+    solution: Option<&Solution>,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Outcome, radiosity::Error> {
+    let mut names = match solution {
+        Some(solution) => solution.light_names().to_vec(),
+        None => LightGroups::new(world).names,
+    };
+    if world.scene.materials.iter().any(|m| m.unlit) {
+        names.push(UNLIT.into());
+    }
+    let as_it_was = world.scene.lights_and_materials();
+    let before = world.bvh.rays_cast();
+    let mut sum: Option<Film> = None;
+    let (mut by_light, mut finished) = (Vec::new(), true);
+    let mut stages: BTreeMap<&'static str, f64> = BTreeMap::new();
+    for (i, name) in names.iter().enumerate() {
+        leave(&mut world.scene, name, &names);
+        world.relight();
+        // It was solved for these very lamps, so that it can be had for some of them.
+        let lit = solution.map(|s| s.relit(world).expect("the solution keeps the lamps of this world apart"));
+        let left = (names.len() - i) as u32;
+        let share = |end: Instant| Instant::now() + end.saturating_duration_since(Instant::now()) / left;
+        let settings = Settings { verify: false, deadline: settings.deadline.map(share), ..settings.clone() };
+        let outcome = render(world, camera, lit.as_ref(), &settings, progress);
+        world.scene.restore(&as_it_was);
+        world.relight();
+        let outcome = outcome?;
+        finished &= outcome.finished;
+        for (stage, seconds) in outcome.report.stages {
+            *stages.entry(stage).or_default() += seconds;
+        }
+        by_light.push((name.clone(), outcome.film.beauty()));
+        sum = Some(match sum {
+            Some(film) => added(film, &outcome.film),
+            None => outcome.film,
+        });
+    }
+    // Without any light the picture is black, but it is one.
+    let film = match sum {
+        Some(film) => film,
+        None => render(world, camera, solution, settings, progress)?.film,
+    };
+    let mut report = Report {
+        stages: stages.into_iter().collect(),
+        texts: solution.map_or_else(Vec::new, |s| facts(&s.report)),
+        radiosity: solution.map(|s| s.report.clone()),
+        verdict: None,
+    };
+    if finished && settings.verify && settings.integrator == Integrator::Hybrid {
+        let clock = Instant::now();
+        let view = View { camera, width: settings.width, height: settings.height };
+        let rays = PROBE_RAYS + (world.bvh.rays_cast() - before) / PROBE_SHARE;
+        let probes = Probes::trace(world, &view, &film, settings.error, settings.seed, rays, progress);
+        report.verdict = probes.map(|probes| probes.judge(&film, settings.error));
+        report.stages.push(("verify", clock.elapsed().as_secs_f64()));
+    }
+    if let Some(verdict) = report.verdict {
+        report.texts.push(("error measured".into(), verdict.to_string()));
+    }
+    Ok(Outcome { film, by_light, finished, report })
+}
+
+/// Leaves of all that shines or shows by itself what is called `name`.
+fn leave(scene: &mut Scene, name: &str, names: &[String]) {
+    scene.leave_lights(|n| match name {
+        UNLIT => false,
+        OTHERS => n == OTHERS || !names.iter().any(|known| known == n),
+        name => n == name,
+    });
+    for material in scene.materials.iter_mut().filter(|m| m.unlit && name != UNLIT) {
+        material.base_color = Rgb::BLACK;
+    }
+}
+
+/// Light of both; what the eye met is the same for both.
+fn added(mut film: Film, other: &Film) -> Film {
+    for (a, b) in film.pixels.iter_mut().zip(&other.pixels) {
+        *a = Pixel {
+            direct: a.direct + b.direct,
+            indirect: a.indirect + b.indirect,
+            specular: a.specular + b.specular,
+            emission: a.emission + b.emission,
+            irradiance: a.irradiance + b.irradiance,
+            variance: a.variance + b.variance,
+            samples: a.samples.max(b.samples),
+            ..*a
+        };
+    }
+    film.repaired += other.repaired;
+    film
+}
