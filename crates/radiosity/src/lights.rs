@@ -144,6 +144,15 @@ impl Solution {
         Solution::of_sites(self.elements.clone(), self.flags.clone(), at_sites, caustics, report)
     }
 
+    /// Mean irradiance over the places where it was gathered, direct and indirect, lx: how much light there is in all.
+    pub fn level(&self) -> f32 {
+        let means = self
+            .at_sites
+            .as_ref()
+            .map(|s| [&s.direct, &s.indirect].map(|e| crate::refine::mean(e).luminance()));
+        means.map_or(0.0, |[direct, indirect]| direct + indirect)
+    }
+
     /// Names of the groups of lamps whose light is kept apart.
     pub fn light_names(&self) -> &[String] {
         let lights = self.at_sites.as_ref().and_then(|s| s.lights.as_ref());

@@ -12,7 +12,7 @@ Examples:
   twolight inspect room.glb --json | jq .cameras
   twolight inspect room.glb --plan --error 1%                what light is in it, and how it will be found")]
 pub struct InspectArgs {
-    /// Scene, .gltf or .glb
+    /// Scene, .gltf or .glb; or a solution, .twl
     pub scene: PathBuf,
     /// Say instead what light each camera sees, and how a render will find it
     #[arg(long)]

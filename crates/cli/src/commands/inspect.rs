@@ -3,7 +3,7 @@
 use super::print;
 use crate::args::InspectArgs;
 use crate::contents::{Contents, contents};
-use crate::{cameras, load};
+use crate::{cameras, load, solutions};
 use anyhow::Result;
 use geometry::World;
 use geometry::gltf::Loaded;
@@ -15,6 +15,10 @@ use std::process::ExitCode;
 
 /// Runs the command.
 pub fn run(args: &InspectArgs) -> Result<ExitCode> {
+    if solutions::is_one(&args.scene) {
+        print(&solutions::described(&args.scene, args.json)?)?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let loaded = load::scene(&args.scene, &args.which)?;
     if args.plan {
         return plan(args, loaded);

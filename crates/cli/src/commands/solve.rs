@@ -20,7 +20,7 @@ use std::time::Instant;
 
 /// Runs the command.
 pub fn run(args: &SolveArgs) -> Result<ExitCode> {
-    if !has_extension(&args.output, "twl") {
+    if !solutions::is_one(&args.output) {
         let message = format!("{} is a solution: name it .twl", args.output.display());
         return Err(AskedWrongly(message).into());
     }
@@ -99,10 +99,6 @@ fn partial(output: &Path) -> PathBuf {
     let mut name = output.as_os_str().to_owned();
     name.push(".partial");
     name.into()
-}
-
-fn has_extension(path: &Path, extension: &str) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension))
 }
 
 /// What `--json` prints.

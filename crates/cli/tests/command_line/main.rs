@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 mod classical;
 mod compare;
 mod render;
+mod solve;
 
 /// A folder for one test.
 fn folder() -> tempfile::TempDir {
@@ -47,6 +48,7 @@ fn help_teaches() {
     for (args, words) in [
         (&["--help"][..], &["render", "inspect", "compare", "Exit status"][..]),
         (&["render", "--help"], &["--error", "--camera", "--sky", "--preview", "Examples", "cd/m2"]),
+        (&["solve", "--help"], &["--camera", "partial", "Examples"]),
         (&["inspect", "--help"], &["--json"]),
         (&["compare", "--help"], &["--difference", "--max-error", "Examples"]),
     ] {
@@ -74,6 +76,8 @@ fn wrong_arguments_exit_2() {
         &["render", "a.glb", "-o", "a.exr", "--exposure", "3"],
         &["render", "a.glb", "-o", "a.exr", "--sky", "1,2"],
         &["render", "a.glb", "-o", "a.exr", "--spp", "16"],
+        &["render", "a.glb", "-o", "a.exr", "--light", "Lamp"],
+        &["solve", "a.glb"],
         &["compare", "a.exr"],
         &["inspect"],
     ] {
