@@ -2,10 +2,12 @@
 
 use crate::args::{DiffuseArg, IntegratorArg, LightArgs, RenderArgs, WhichArgs};
 use crate::classical;
+use crate::views::Views;
 use anyhow::Result;
 use geometry::Camera;
 use radiosity::classical::Config as Classical;
 use radiosity::solution_file::About;
+use raytrace::exr;
 use raytrace::output::check_writable;
 use raytrace::{DiffuseMode, Integrator, Settings};
 use std::path::{Path, PathBuf};
@@ -46,7 +48,11 @@ pub struct RenderJob {
     /// Exposure value of the preview; automatic if absent.
     pub exposure: Option<f32>,
     /// What of the file to show.
-    pub which: WhichArgs,
+    which: WhichArgs,
+    /// How the views follow from one another.
+    pub views: Views,
+    /// Leave out what is there.
+    pub skip_existing: bool,
     /// Which camera, as typed.
     pub camera: Option<String>,
     /// What shines, beside what the file says.
@@ -74,6 +80,19 @@ pub struct RenderJob {
     gather_rays: Option<u32>,
     samples: Option<u32>,
     verify: bool,
+}
+
+/// A picture to be made.
+#[derive(Clone, Debug)]
+pub struct Shot {
+    /// The camera that was chosen; in a sequence it moves.
+    pub camera: Camera,
+    /// Its number in a sequence.
+    pub frame: Option<u32>,
+    /// EXR to write.
+    pub output: PathBuf,
+    /// PNG to write.
+    pub preview: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -129,6 +148,15 @@ impl RenderJob {
         {
             return wrong(format!("the preview {} is written as PNG: name it .png", preview.display()));
         }
+        let views = Views::new(&args.views)?;
+        if let Views::Animation { .. } = views
+            && args.which.time.is_some()
+        {
+            return wrong("--frames go through the animation: not with --time".into());
+        }
+        if views.frames().is_some() && args.snapshots {
+            return wrong("--snapshots are of one picture: not with a sequence".into());
+        }
         for path in [Some(&args.output), args.preview.as_ref()].into_iter().flatten() {
             check_writable(path)?;
         }
@@ -138,6 +166,8 @@ impl RenderJob {
             preview: args.preview,
             exposure: args.exposure,
             which: args.which,
+            views,
+            skip_existing: args.views.skip_existing,
             camera: args.camera,
             light: args.light,
             json: args.run.json,
@@ -168,6 +198,41 @@ impl RenderJob {
             solution: args.solution,
             light_layers: args.light_layers,
         })
+    }
+
+    /// What of the file to show at `time`, where that is given.
+    pub fn which_at(&self, time: Option<f32>) -> WhichArgs {
+        WhichArgs { time: time.or(self.which.time), ..self.which.clone() }
+    }
+
+    /// Numbers of the frames that are not there yet; `None` where each camera has one picture.
+    pub fn frames(&self) -> Option<Vec<u32>> {
+        let there = |frame: &u32| self.skip_existing && exr::is_finished(&numbered(&self.output, *frame));
+        self.views.frames().map(|frames| frames.filter(|frame| !there(frame)).collect())
+    }
+
+    /// The pictures to make, of `frames` or of each of `cameras`.
+    pub fn shots(&self, frames: Option<Vec<u32>>, cameras: &[Camera]) -> Result<Vec<Shot>> {
+        let named = |camera: &Camera, name: &dyn Fn(&Path) -> PathBuf, frame| Shot {
+            camera: camera.clone(),
+            frame,
+            output: name(&self.output),
+            preview: self.preview.as_deref().map(name),
+        };
+        let several = self.camera.as_deref() == Some("all");
+        match frames {
+            Some(_) if cameras.len() > 1 => {
+                Err(AskedWrongly("a sequence is seen by one camera: name one (--camera)".into()).into())
+            }
+            Some(frames) => Ok(frames
+                .into_iter()
+                .map(|frame| named(&cameras[0], &|path| numbered(path, frame), Some(frame)))
+                .collect()),
+            None if several => {
+                Ok(cameras.iter().map(|c| named(c, &|path| with_name(path, &c.name), None)).collect())
+            }
+            None => Ok(cameras.iter().map(|c| named(c, &|path| path.to_path_buf(), None)).collect()),
+        }
     }
 
     /// Error that is asked of the pictures: what was typed, or what a solution was made for, or 2 %.
@@ -226,6 +291,15 @@ pub fn with_name(path: &Path, name: &str) -> PathBuf {
     path.with_file_name(format!("{stem}.{name}{extension}"))
 }
 
+/// `path` for one frame: its number in place of the last run of #, as long as that; before the extension where there is none.
+pub fn numbered(path: &Path, frame: u32) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let Some(end) = name.rfind('#').map(|i| i + 1) else { return with_name(path, &format!("{frame:04}")) };
+    let start = name[..end].trim_end_matches('#').len();
+    let digits = end - start;
+    path.with_file_name(format!("{}{frame:0digits$}{}", &name[..start], &name[end..]))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -273,5 +347,8 @@ mod tests {
     fn names_of_cameras_become_names_of_files() {
         assert_eq!(with_name(Path::new("d/out.exr"), "Hall 2"), Path::new("d/out.Hall 2.exr"));
         assert_eq!(with_name(Path::new("out.exr"), "a/../b"), Path::new("out.a_.._b.exr"));
+        assert_eq!(numbered(Path::new("d/a.####.exr"), 7), Path::new("d/a.0007.exr"));
+        assert_eq!(numbered(Path::new("a#1-##.exr"), 123), Path::new("a#1-123.exr"));
+        assert_eq!(numbered(Path::new("d#/a.exr"), 7), Path::new("d#/a.0007.exr"));
     }
 }

@@ -12,10 +12,12 @@ mod contents;
 mod doctor;
 mod job;
 mod load;
+mod picture;
 mod progress;
 mod room;
 mod solutions;
 mod values;
+mod views;
 
 use args::{Cli, Command};
 use clap::Parser;
@@ -27,6 +29,8 @@ fn main() -> ExitCode {
         Command::Solve(args) => commands::solve::run(&args),
         Command::Inspect(args) => commands::inspect::run(&args),
         Command::Compare(args) => commands::compare::run(&args),
+        Command::Completions { shell } => commands::manual::completions(shell),
+        Command::Man => commands::manual::page(),
     };
     match result {
         Ok(code) => code,

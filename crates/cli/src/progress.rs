@@ -1,10 +1,12 @@
 //! What goes on, on stderr: a bar for each stage, and Ctrl-C.
 
+use geometry::Rgb;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use raytrace::Progress;
+use raytrace::{Progress, tonemap};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Bars on stderr with the time left; silent where stderr is no terminal, or on request.
 #[derive(Debug)]
@@ -13,7 +15,21 @@ pub struct Bars {
     shown: bool,
     quiet: bool,
     stop: Arc<AtomicBool>,
+    preview: Mutex<Option<Preview>>,
 }
+
+/// A picture to look at while it gets better.
+#[derive(Debug)]
+struct Preview {
+    path: PathBuf,
+    /// EV; automatic if absent.
+    exposure: Option<f32>,
+    /// When it was written last.
+    written: Option<Instant>,
+}
+
+/// A preview is not written more often than this.
+const PREVIEW_EVERY: Duration = Duration::from_secs(2);
 
 impl Bars {
     /// `quiet`: no bars, no notes.
@@ -24,6 +40,7 @@ impl Bars {
             shown: !quiet && std::io::stderr().is_terminal(),
             quiet,
             stop: Arc::default(),
+            preview: Mutex::default(),
         }
     }
 
@@ -59,6 +76,17 @@ impl Bars {
         if !self.quiet {
             self.with(|bar| bar.suspend(|| eprintln!("{text}")));
         }
+    }
+
+    /// From now on writes the picture as far as it is done to `path`, every few seconds; with `None` no more, and the last
+    /// one goes.
+    pub fn show_in(&self, path: Option<PathBuf>, exposure: Option<f32>) {
+        let mut preview = self.preview.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(old) = preview.take().filter(|old| old.written.is_some()) {
+            // It may have been moved away by whoever looks at it.
+            let _ = std::fs::remove_file(old.path);
+        }
+        *preview = path.map(|path| Preview { path, exposure, written: None });
     }
 
     /// Ends the last stage.
@@ -102,5 +130,18 @@ impl Progress for Bars {
 
     fn stopped(&self) -> bool {
         self.interrupted()
+    }
+
+    fn picture(&self, width: u32, height: u32, pixels: &dyn Fn() -> Vec<Rgb>) {
+        let mut preview = self.preview.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(preview) = &mut *preview else { return };
+        if preview.written.is_some_and(|at| at.elapsed() < PREVIEW_EVERY) {
+            return;
+        }
+        let pixels = pixels();
+        let ev = preview.exposure.unwrap_or_else(|| tonemap::automatic_exposure(&pixels));
+        // What cannot be written now is told of when the whole picture is.
+        let _ = tonemap::write_png(width, height, &tonemap::to_srgb(&pixels, ev), &preview.path);
+        preview.written = Some(Instant::now());
     }
 }

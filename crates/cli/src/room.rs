@@ -5,6 +5,7 @@ use crate::job::AskedWrongly;
 use crate::load;
 use crate::progress::Bars;
 use anyhow::{Context, Result};
+use geometry::gltf::Loaded;
 use geometry::{Camera, MaterialId, Scene, World};
 use raytrace::Progress;
 use std::path::Path;
@@ -28,20 +29,9 @@ impl Room {
     pub fn open(path: &Path, which: &WhichArgs, light: &LightArgs, bars: &Bars) -> Result<Room> {
         let mut clock = Instant::now();
         bars.stage("load", 0);
-        let mut loaded = load::scene(path, which)?;
+        let loaded = load_lit(path, which, light)?;
         for warning in &loaded.warnings {
             bars.note(&format!("warning: {warning}"));
-        }
-        if let Some(value) = &light.sky {
-            loaded.scene.sky = Some(load::sky(value, light.sky_strength)?);
-        }
-        let names = loaded.scene.light_names();
-        for (name, factor) in &light.lights {
-            if !names.contains(name) {
-                let message = format!("there is no light {name:?}; the file has {}", names.join(", "));
-                return Err(AskedWrongly(message).into());
-            }
-            loaded.scene.scale_lights(name, *factor);
         }
         if !is_lit(&loaded.scene) {
             bars.note("warning: nothing in the file shines, all will be black: try --sky 1000 (cd/m2)");
@@ -52,6 +42,35 @@ impl Room {
         stages.push(("build", lap(&mut clock)));
         Ok(Room { world, cameras: loaded.cameras, warnings: loaded.warnings, stages })
     }
+
+    /// Reads `path` again at another time; returns whether anything but cameras is different there.
+    pub fn go_to(&mut self, path: &Path, which: &WhichArgs, light: &LightArgs) -> Result<bool> {
+        let loaded = load_lit(path, which, light)?;
+        self.cameras = loaded.cameras;
+        let (before, now) = (&self.world.scene, &loaded.scene);
+        if before.fingerprint() == now.fingerprint() && before.emissions() == now.emissions() {
+            return Ok(false);
+        }
+        self.world = World::new(loaded.scene);
+        Ok(true)
+    }
+}
+
+/// The scene of `path` as it is to shine.
+fn load_lit(path: &Path, which: &WhichArgs, light: &LightArgs) -> Result<Loaded> {
+    let mut loaded = load::scene(path, which)?;
+    if let Some(value) = &light.sky {
+        loaded.scene.sky = Some(load::sky(value, light.sky_strength)?);
+    }
+    let names = loaded.scene.light_names();
+    for (name, factor) in &light.lights {
+        if !names.contains(name) {
+            let message = format!("there is no light {name:?}; the file has {}", names.join(", "));
+            return Err(AskedWrongly(message).into());
+        }
+        loaded.scene.scale_lights(name, *factor);
+    }
+    Ok(loaded)
 }
 
 /// Starts `threads` threads, or one for each processor.

@@ -1,6 +1,7 @@
 //! Values as people type them: 2%, 90s, 640x480, 0.2,0.3,1.
 
-use geometry::Rgb;
+use geometry::{Rgb, Vec3};
+use std::ops::Range;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -80,6 +81,43 @@ pub fn sky(s: &str) -> Result<SkyValue, String> {
     }
 }
 
+/// Frames: "0..120" (the last is 119), or "7".
+pub fn frames(s: &str) -> Result<Range<u32>, String> {
+    let help = "write FIRST..END, such as 0..120, or one number";
+    let number = |s: &str| s.trim().parse::<u32>().map_err(|_| help);
+    let range = match s.split_once("..") {
+        Some((a, b)) => number(a)?..number(b)?,
+        None => number(s)?..number(s)?.checked_add(1).ok_or(help)?,
+    };
+    if range.is_empty() { Err("there is no frame among these".into()) } else { Ok(range) }
+}
+
+/// Two places or more, m.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Places(pub Vec<Vec3>);
+
+/// Places: "0,1.6,3 2,1.6,0", also with ; between them.
+pub fn places(s: &str) -> Result<Places, String> {
+    let all: Result<Vec<Vec3>, String> = s.split([' ', ';']).filter(|p| !p.is_empty()).map(place).collect();
+    let all = all?;
+    if all.len() < 2 { Err("write two places at least: \"0,1.6,3 2,1.6,0\"".into()) } else { Ok(Places(all)) }
+}
+
+/// A place or a direction: "1,0.85,2".
+pub fn place(s: &str) -> Result<Vec3, String> {
+    let numbers: Result<Vec<f32>, String> = s.split(',').map(number).collect();
+    match numbers?[..] {
+        [x, y, z] => Ok(Vec3::new(x, y, z)),
+        _ => Err(format!("{s:?} is no place: write X,Y,Z")),
+    }
+}
+
+/// A finite number above 0.
+pub fn positive(s: &str) -> Result<f32, String> {
+    let value = number(s)?;
+    if value > 0.0 { Ok(value) } else { Err("it must be above 0".into()) }
+}
+
 /// A factor on the lamps of a name: "Desk lamp=0.5", "sky=1,0.9,0.8".
 pub fn light(s: &str) -> Result<(String, Rgb), String> {
     let help = "write NAME=FACTOR or NAME=R,G,B, such as Lamp=0.5";
@@ -136,6 +174,19 @@ mod tests {
         assert_eq!(size("640x480"), Ok((640, 480)));
         for bad in ["640", "0x4", "4x", "axb", "4x-4", "1x2x3"] {
             assert!(size(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn frames_and_places_are_read() {
+        assert_eq!(frames("0..120"), Ok(0..120));
+        assert_eq!(frames("7"), Ok(7..8));
+        for bad in ["", "..", "3..3", "5..2", "a..b", "-1..2", "0..=4", "4294967295"] {
+            assert!(frames(bad).is_err(), "{bad}");
+        }
+        assert_eq!(places("0,1,2 3,4,5;6,7,8").map(|p| p.0.len()), Ok(3));
+        for bad in ["", "0,1,2", "0,1 2,3", "a,b,c d,e,f", "0,0,inf 1,1,1"] {
+            assert!(places(bad).is_err(), "{bad}");
         }
     }
 

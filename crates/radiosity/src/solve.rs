@@ -113,6 +113,8 @@ pub trait Progress: Sync {
     fn advance(&self, n: u64);
     /// Whether to stop refining and finish with what there is.
     fn stopped(&self) -> bool;
+    /// The picture so far, to look at: its size, and its pixels (cd/m²) for those who want them.
+    fn picture(&self, _width: u32, _height: u32, _pixels: &dyn Fn() -> Vec<Rgb>) {}
 }
 
 /// Nobody listens.

@@ -31,6 +31,7 @@ impl<'a> Adaptive<'a> {
         progress.stage("image", u64::from(pixels));
         let everywhere: Vec<u32> = (0..pixels).collect();
         self.shots = over_pixels(&everywhere, progress, |i| self.shade(i, FIRST));
+        self.show(progress);
         self.shots.iter().all(Option::is_some)
     }
 
@@ -54,11 +55,16 @@ impl<'a> Adaptive<'a> {
                     self.shots[i as usize] = shot;
                 }
             }
+            self.show(progress);
             if !finished {
                 return false;
             }
         }
         true
+    }
+
+    fn show(&self, progress: &dyn Progress) {
+        progress.picture(self.view.width, self.view.height, &|| self.film().0.beauty());
     }
 
     fn shade(&self, i: u32, effort: Effort) -> Shot {

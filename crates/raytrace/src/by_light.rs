@@ -56,7 +56,7 @@ pub fn render_by_light(
             deadline: settings.deadline.map(share),
             ..settings.clone()
         };
-        let outcome = render(world, camera, lit.as_ref(), &settings, progress);
+        let outcome = render(world, camera, lit.as_ref(), &settings, &Unseen(progress));
         world.scene.restore(&as_it_was);
         world.relight();
         let outcome = outcome?;
@@ -93,6 +93,21 @@ pub fn render_by_light(
         report.texts.push(("error measured".into(), verdict.to_string()));
     }
     Ok(Outcome { film, by_light, finished, report })
+}
+
+/// Shows no pictures: each would be of one group alone.
+struct Unseen<'a>(&'a dyn Progress);
+
+impl Progress for Unseen<'_> {
+    fn stage(&self, name: &'static str, total: u64) {
+        self.0.stage(name, total);
+    }
+    fn advance(&self, n: u64) {
+        self.0.advance(n);
+    }
+    fn stopped(&self) -> bool {
+        self.0.stopped()
+    }
 }
 
 /// Leaves of all that shines or shows by itself what is called `name`.

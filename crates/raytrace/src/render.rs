@@ -130,6 +130,9 @@ impl Progress for Watch<'_> {
     fn stopped(&self) -> bool {
         self.progress.stopped() || self.deadline.is_some_and(|end| Instant::now() >= end)
     }
+    fn picture(&self, width: u32, height: u32, pixels: &dyn Fn() -> Vec<Rgb>) {
+        self.progress.picture(width, height, pixels);
+    }
 }
 
 impl Watch<'_> {
@@ -370,6 +373,7 @@ fn trace_paths(world: &World, view: &View, spp: u32, seed: u64, watch: &Watch) -
             }
         }
         done += n;
+        watch.picture(size.0, size.1, &|| pixels.iter().map(Pixel::beauty).collect());
     }
     (Film::from_pixels(size.0, size.1, pixels), finished)
 }

@@ -30,6 +30,13 @@ pub fn automatic_exposure(pixels: &[Rgb]) -> f32 {
     ((white.max(1e-6) * 0.18 / 0.125) as f32).log2()
 }
 
+/// The exposure value (ISO 100) for a room of mean irradiance `e`, lx, whatever part of it is in view: as an incident-light
+/// meter would set it, for surfaces that reflect a half.
+pub fn incident_exposure(e: f32) -> f32 {
+    let white = 0.5 * e / std::f32::consts::PI / SHOWN_BRIGHTNESS as f32;
+    (white.max(1e-6) * 0.18 / 0.125).log2()
+}
+
 /// Linear light over white to what a screen can show, [0, 1], still linear.
 ///
 /// Khronos' PBR Neutral (2024) without its toe: colours below the knee stay exactly as they are; above, the

@@ -4,11 +4,13 @@ mod compare;
 mod inspect;
 mod render;
 mod solve;
+mod views;
 
 pub use compare::CompareArgs;
 pub use inspect::InspectArgs;
 pub use render::{DiffuseArg, IntegratorArg, RenderArgs, SolverArg};
 pub use solve::SolveArgs;
+pub use views::ViewArgs;
 
 use crate::values::{self, SkyValue};
 use clap::{Args, Parser, Subcommand};
@@ -43,6 +45,13 @@ pub enum Command {
     Inspect(InspectArgs),
     /// Measure how far a picture is from a reference
     Compare(CompareArgs),
+    /// Print completions for a shell: source <(twolight completions bash)
+    Completions {
+        /// Which shell
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page: twolight man | man -l -
+    Man,
 }
 
 /// What of a file to show.

@@ -1,6 +1,6 @@
 //! `twolight render`.
 
-use super::{LightArgs, RunArgs, WhichArgs};
+use super::{LightArgs, RunArgs, ViewArgs, WhichArgs};
 use crate::values;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
@@ -14,6 +14,8 @@ Examples:
   twolight render room.glb -o room.exr --error 1% --size 1920x1080
   twolight render room.glb -o room.exr --preview room.png    also a picture to look at
   twolight render room.glb -o room.exr --camera all          room.Kitchen.exr, room.Hall.exr, ...
+  twolight render room.glb -o walk.####.exr --frames 0..120  the file's animation: walk.0000.exr, ...
+  twolight render room.glb -o turn.####.exr --orbit 36       around what the camera looks at
   twolight render room.glb -o room.exr --time-limit 60s      the best that a minute gives
   twolight render room.glb -o room.exr --solution room.twl   what `twolight solve` found, for another view
   twolight render room.glb -o room.exr --light Lamp=0.5,0.4,0.3   dimmed and tinted
@@ -27,10 +29,10 @@ number of threads. Ctrl-C saves what there is, marked unfinished; a second Ctrl-
 pub struct RenderArgs {
     /// Scene, .gltf or .glb
     pub scene: PathBuf,
-    /// Picture to write, .exr; an old one is replaced once the new one is complete
+    /// Picture to write, .exr; an old one is replaced once the new one is complete. #### stands for a frame's number
     #[arg(short, long, value_name = "OUT.exr")]
     pub output: PathBuf,
-    /// Also write an 8-bit sRGB picture to look at
+    /// Also write an 8-bit sRGB picture to look at; while it works, P.partial.png shows how far it is
     #[arg(long, value_name = "P.png")]
     pub preview: Option<PathBuf>,
     /// Exposure value (EV at ISO 100) of the preview; automatic if absent, and then printed
@@ -41,6 +43,8 @@ pub struct RenderArgs {
     /// Camera by name or by its number in `inspect`, or `all`; the first if absent
     #[arg(long, value_name = "NAME|NUMBER|all")]
     pub camera: Option<String>,
+    #[command(flatten)]
+    pub views: ViewArgs,
     /// Pixels, such as 1920x1080; 512 on the shorter side if absent
     #[arg(long, value_name = "WxH", conflicts_with = "width", value_parser = values::size)]
     pub size: Option<(u32, u32)>,

@@ -2,6 +2,7 @@
 
 pub mod compare;
 pub mod inspect;
+pub mod manual;
 pub mod render;
 mod snapshots;
 pub mod solve;

@@ -2,18 +2,18 @@
 
 use super::{print, snapshots};
 use crate::args::RenderArgs;
-use crate::job::{RenderJob, with_name};
+use crate::job::{RenderJob, Shot, with_name};
+use crate::picture::{Picture, save};
 use crate::progress::Bars;
 use crate::room::{Room, lap, start_threads};
 use crate::{cameras, solutions};
 use anyhow::{Context, Result};
 use geometry::Camera;
-use raytrace::exr::Metadata;
-use raytrace::verify::{Judgement, Verdict};
-use raytrace::{Integrator, Outcome, Settings, exr, prepass_for, render, render_by_light, tonemap};
+use radiosity::Solution;
+use raytrace::tonemap::incident_exposure;
+use raytrace::{Integrator, Settings, exr, prepass_for, render, render_by_light};
 use serde::Serialize;
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -27,85 +27,46 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
     start_threads(job.threads)?;
     bars.listen_for_interrupts();
 
-    let Room { mut world, cameras, warnings, stages } =
-        Room::open(&job.scene, &job.which, &job.light, &bars)?;
-    // What all pictures share is told with the first.
-    let mut shared = stages;
-    let choice = cameras::choose(job.camera.as_deref(), &cameras, &world.scene)?;
+    let start = Instant::now();
+    let frames = job.frames();
+    let time = frames.iter().flatten().next().and_then(|&frame| job.views.time(frame));
+    let room = Room::open(&job.scene, &job.which_at(time), &job.light, &bars)?;
+    let choice = cameras::choose(job.camera.as_deref(), &room.cameras, &room.world.scene)?;
     if let Some(note) = &choice.note {
         bars.note(&format!("note: {note}"));
     }
-    let mut clock = Instant::now();
-    let several = job.camera.as_deref() == Some("all");
-    let mut pictures = Vec::new();
-    let (mut rays_before, mut missed) = (0, false);
-    let (mut solution, about) = match &job.solution {
-        Some(path) => solutions::read(path, &world).map(|(solution, about)| (Some(solution), Some(about)))?,
-        None => (None, None),
-    };
-    let error = job.error(about.as_ref());
-    if let Some(about) = about {
-        shared.push(("solution", lap(&mut clock)));
-        if error < about.error {
-            let [asked, made] = [error, about.error].map(|e| (100.0 * e).to_string());
-            bars.note(&format!("note: {asked} % is asked, and the solution was made for {made} %"));
+    let warnings = room.warnings.clone();
+    let mut work = Work::new(&job, &bars, room, &choice.cameras)?;
+    let shots = job.shots(frames, &choice.cameras)?;
+    let wanted = job.views.frames().map_or(shots.len(), |frames| frames.len());
+    let mut missed = false;
+    for shot in shots {
+        if job.skip_existing && exr::is_finished(&shot.output) {
+            continue;
         }
-    }
-    for camera in &choice.cameras {
-        let path = |base: &Path| if several { with_name(base, &camera.name) } else { base.to_path_buf() };
-        let (output, preview) = (path(&job.output), job.preview.as_deref().map(path));
-        let settings = job.settings(camera, error)?;
-        if settings.integrator == Integrator::Hybrid && solution.is_none() {
-            // Light does not know where we stand: one solution serves all views.
-            solution = Some(match &job.classical {
-                Some(config) if job.snapshots => {
-                    let (solution, on_the_way) = snapshots::take(&job, &world, camera, config, error, &bars)?;
-                    pictures.extend(on_the_way);
-                    solution
-                }
-                _ => prepass_for(&world, &choice.cameras, &settings, &bars)
-                    .with_context(|| format!("cannot solve {}", job.scene.display()))?,
-            });
-            shared.push(("prepass", lap(&mut clock)));
-        }
-        let mut outcome = match job.light_layers {
-            true => render_by_light(&mut world, camera, solution.as_ref(), &settings, &bars)?,
-            false => render(&world, camera, solution.as_ref(), &settings, &bars)?,
-        };
-        outcome.report.stages.append(&mut shared);
-        let rays = world.bvh.rays_cast();
-        let rays = rays - std::mem::replace(&mut rays_before, rays);
-        bars.done();
-        if !outcome.finished && outcome.film.is_blank() {
-            // An old picture is worth more than a black one.
-            let why = if bars.interrupted() { "stopped" } else { "the time was up" };
-            anyhow::bail!("{why} before a pixel was rendered: {} is not written", output.display());
-        }
-        let pair = preview.as_ref().filter(|_| job.snapshots).map(|p| with_name(p, "without-and-with"));
-        let film = pair.is_some().then(|| outcome.film.clone());
-        let picture = save(&job, camera, &settings, outcome, output, preview, rays)?;
-        if let (Some(pair), Some(film), Some(ev)) = (pair, film, picture.exposure) {
-            snapshots::side_by_side(&film, ev, &pair)?;
-        }
+        let picture = work.picture(&shot)?;
         if picture.repaired > 0 {
             let message = "pixels were not finite or negative and are black instead; please report it";
             bars.note(&format!("warning: {} {message}", picture.repaired));
         }
-        if let Some(Accuracy { judgement: "missed", .. }) = picture.accuracy {
+        if picture.missed() {
             missed = true;
             bars.note(&format!("warning: {} is not as exact as asked", picture.output.display()));
         }
         if !job.json {
-            print(&picture.line())?;
+            print(&if shot.frame.is_some() { picture.short_line() } else { picture.line() })?;
         }
-        pictures.push(picture);
+        work.pictures.push(picture);
         if bars.interrupted() {
             break;
         }
     }
-    if job.json {
-        let report = Report { scene: job.scene, warnings, pictures };
-        print(&serde_json::to_string_pretty(&report)?)?;
+    let report =
+        Report { skipped: wanted - work.pictures.len(), warnings, pictures: work.pictures, scene: job.scene };
+    match job.json {
+        true => print(&serde_json::to_string_pretty(&report)?)?,
+        false if wanted > 1 => print(&report.summary(start.elapsed().as_secs_f64()))?,
+        false => (),
     }
     Ok(match () {
         () if bars.interrupted() => ExitCode::FAILURE,
@@ -114,156 +75,141 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
     })
 }
 
+/// A room, and its light as far as it is known.
+struct Work<'a> {
+    job: &'a RenderJob,
+    bars: &'a Bars,
+    room: Room,
+    /// Whose views the first pass takes care of; none for all of the room alike.
+    seen_by: Vec<Camera>,
+    solution: Option<Solution>,
+    /// Relative error that is asked.
+    error: f32,
+    /// Seconds of what pictures share: told with the next of them.
+    shared: Vec<(&'static str, f64)>,
+    /// Rays cast before.
+    rays: u64,
+    pictures: Vec<Picture>,
+}
+
+impl<'a> Work<'a> {
+    fn new(job: &'a RenderJob, bars: &'a Bars, mut room: Room, cameras: &[Camera]) -> Result<Work<'a>> {
+        let mut clock = Instant::now();
+        let mut shared = std::mem::take(&mut room.stages);
+        let (mut solution, mut error) = (None, job.error(None));
+        if let Some(path) = &job.solution {
+            let (read, about) = solutions::read(path, &room.world)?;
+            (solution, error) = (Some(read), job.error(Some(&about)));
+            shared.push(("solution", lap(&mut clock)));
+            if error < about.error {
+                let [asked, made] = [error, about.error].map(|e| (100.0 * e).to_string());
+                bars.note(&format!("note: {asked} % is asked, and the solution was made for {made} %"));
+            }
+        }
+        // A part of a sequence is to be the same whoever renders it: its first pass knows none of the views.
+        let seen_by = if job.views.frames().is_some() { Vec::new() } else { cameras.to_vec() };
+        Ok(Work { job, bars, room, seen_by, solution, error, shared, rays: 0, pictures: Vec::new() })
+    }
+
+    /// Renders one picture and writes it.
+    fn picture(&mut self, shot: &Shot) -> Result<Picture> {
+        let (job, bars) = (self.job, self.bars);
+        let mut camera = shot.camera.clone();
+        if let Some(frame) = shot.frame {
+            if let Some(time) = job.views.time(frame) {
+                // Where things moved, and not only the camera, their light is another.
+                if self.room.go_to(&job.scene, &job.which_at(Some(time)), &job.light)? {
+                    self.solution = match &job.solution {
+                        Some(path) => Some(solutions::read(path, &self.room.world)?.0),
+                        None => None,
+                    };
+                    self.rays = 0;
+                }
+                let of_now = self.room.cameras.iter().find(|c| c.name == camera.name);
+                camera = of_now.cloned().unwrap_or(camera);
+            }
+            camera = job.views.camera(frame, &camera, &self.room.world);
+        }
+        let settings = job.settings(&camera, self.error)?;
+        self.solve(&settings, &camera)?;
+        // Frames that follow one another are exposed alike.
+        let exposure = job.exposure.or_else(|| {
+            let level = shot.frame.and(self.solution.as_ref()).map(Solution::level);
+            level.filter(|&e| e > 0.0).map(incident_exposure)
+        });
+        // An earlier preview is worth more than one that is half done.
+        bars.show_in(shot.preview.as_ref().map(|p| with_name(p, "partial")), exposure);
+        let (world, solution) = (&mut self.room.world, self.solution.as_ref());
+        let mut outcome = match job.light_layers {
+            true => render_by_light(world, &camera, solution, &settings, bars)?,
+            false => render(world, &camera, solution, &settings, bars)?,
+        };
+        outcome.report.stages.append(&mut self.shared);
+        let rays = self.room.world.bvh.rays_cast();
+        let rays = rays - std::mem::replace(&mut self.rays, rays);
+        bars.done();
+        if !outcome.finished && outcome.film.is_blank() {
+            // An old picture is worth more than a black one.
+            let why = if bars.interrupted() { "stopped" } else { "the time was up" };
+            anyhow::bail!("{why} before a pixel was rendered: {} is not written", shot.output.display());
+        }
+        let pair = shot.preview.as_ref().filter(|_| job.snapshots).map(|p| with_name(p, "without-and-with"));
+        let film = pair.is_some().then(|| outcome.film.clone());
+        let (output, preview) = (shot.output.clone(), shot.preview.clone());
+        bars.show_in(None, None);
+        let picture = save(exposure, &camera, &settings, outcome, output, preview, rays)?;
+        if let (Some(pair), Some(film), Some(ev)) = (pair, film, picture.exposure) {
+            snapshots::side_by_side(&film, ev, &pair)?;
+        }
+        Ok(picture)
+    }
+
+    /// Light does not know where we stand: one solution serves all views.
+    fn solve(&mut self, settings: &Settings, camera: &Camera) -> Result<()> {
+        if settings.integrator != Integrator::Hybrid || self.solution.is_some() {
+            return Ok(());
+        }
+        let (job, bars, world) = (self.job, self.bars, &self.room.world);
+        let mut clock = Instant::now();
+        self.solution = Some(match &job.classical {
+            Some(config) if job.snapshots => {
+                let (solution, on_the_way) = snapshots::take(job, world, camera, config, self.error, bars)?;
+                self.pictures.extend(on_the_way);
+                solution
+            }
+            _ => prepass_for(world, &self.seen_by, settings, bars)
+                .with_context(|| format!("cannot solve {}", job.scene.display()))?,
+        });
+        self.shared.push(("prepass", lap(&mut clock)));
+        Ok(())
+    }
+}
+
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Report {
     scene: PathBuf,
     warnings: Vec<String>,
+    /// Pictures that were there already.
+    skipped: usize,
     pictures: Vec<Picture>,
 }
 
-/// One picture that was written. What all pictures share, up to the prepass, is counted with the first.
-#[derive(Serialize)]
-pub(super) struct Picture {
-    output: PathBuf,
-    preview: Option<PathBuf>,
-    camera: String,
-    width: u32,
-    height: u32,
-    finished: bool,
-    seconds: f64,
-    rays: u64,
-    stages: BTreeMap<&'static str, f64>,
-    exposure: Option<f32>,
-    repaired: u64,
-    accuracy: Option<Accuracy>,
-    report: BTreeMap<String, String>,
-}
-
-/// How exact a picture is, in percent; `None` where it was not measured.
-#[derive(Serialize)]
-struct Accuracy {
-    asked: f32,
-    measured: f64,
-    /// Ends of the interval that holds the error with 95 % confidence.
-    low: f64,
-    high: f64,
-    judgement: &'static str,
-    probes: usize,
-    paths: u64,
-}
-
-impl From<Verdict> for Accuracy {
-    fn from(v: Verdict) -> Accuracy {
-        let judgement = match v.judgement() {
-            Judgement::Met => "met",
-            Judgement::Open => "open",
-            Judgement::Missed => "missed",
-        };
-        let [measured, low, high] = [v.error, v.low, v.high].map(|e| 100.0 * e);
-        Accuracy {
-            asked: (100.0 * v.asked) as f32,
-            measured,
-            low,
-            high,
-            judgement,
-            probes: v.probes,
-            paths: v.paths,
+impl Report {
+    /// All pictures in a few words.
+    fn summary(&self, seconds: f64) -> String {
+        let mut errors: Vec<f64> = self.pictures.iter().filter_map(Picture::measured).collect();
+        errors.sort_by(f64::total_cmp);
+        let s = if self.pictures.len() == 1 { "" } else { "s" };
+        let mut words = format!("{} picture{s} in {seconds:.1} s", self.pictures.len());
+        if self.skipped > 0 {
+            words += &format!(", {} were there or are left", self.skipped);
         }
-    }
-}
-
-impl Picture {
-    pub(super) fn line(&self) -> String {
-        let mut line = format!(
-            "{}: {}x{}, camera {:?}, {:.1} s",
-            self.output.display(),
-            self.width,
-            self.height,
-            self.camera,
-            self.seconds
-        );
-        if let (Some(preview), Some(ev)) = (&self.preview, self.exposure) {
-            line += &format!("; {} at EV {ev:.1}", preview.display());
+        if let Some(middle) = errors.get(errors.len() / 2) {
+            let (least, most) = (errors[0], errors[errors.len() - 1]);
+            words +=
+                &format!("; errors measured: {least:.1} to {most:.1} %, half of them below {middle:.1} %");
         }
-        if !self.finished {
-            line += "; unfinished";
-        }
-        for (name, value) in &self.report {
-            // Of several lines each is one of its own, indented alike.
-            let value = if value.contains('\n') { format!("\n{value}") } else { format!(" {value}") };
-            line += &format!("\n  {name}:{}", value.replace('\n', "\n    "));
-        }
-        line
+        words
     }
-}
-
-/// Writes what was rendered.
-pub(super) fn save(
-    job: &RenderJob,
-    camera: &Camera,
-    settings: &Settings,
-    outcome: Outcome,
-    output: PathBuf,
-    preview: Option<PathBuf>,
-    rays: u64,
-) -> Result<Picture> {
-    let started = Instant::now();
-    let Outcome { film, by_light, finished, report } = outcome;
-    exr::write(&film, &by_light, &metadata(camera, settings, finished, &report.texts), &output)?;
-    let mut exposure = None;
-    if let Some(path) = &preview {
-        let beauty = film.beauty();
-        let ev = job.exposure.unwrap_or_else(|| tonemap::automatic_exposure(&beauty));
-        tonemap::write_png(film.width, film.height, &tonemap::to_srgb(&beauty, ev), path)?;
-        exposure = Some(ev);
-    }
-    let mut stages: BTreeMap<_, f64> = BTreeMap::new();
-    for (name, seconds) in report.stages {
-        *stages.entry(name).or_default() += seconds;
-    }
-    stages.insert("write", started.elapsed().as_secs_f64());
-    Ok(Picture {
-        output,
-        preview,
-        camera: camera.name.clone(),
-        width: film.width,
-        height: film.height,
-        finished,
-        seconds: stages.values().sum(),
-        rays,
-        stages,
-        exposure,
-        repaired: film.repaired,
-        accuracy: report.verdict.map(Accuracy::from),
-        report: report.texts.into_iter().collect(),
-    })
-}
-
-/// What the EXR says of itself. Nothing that differs between two runs of the same job.
-fn metadata(camera: &Camera, settings: &Settings, finished: bool, texts: &[(String, String)]) -> Metadata {
-    let mut metadata = Metadata { world_to_camera: Some(camera.to_world.inverse()), texts: texts.to_vec() };
-    metadata.push("units", "cd/m2; irradiance lx; depth and position m");
-    metadata.push("camera", &camera.name);
-    metadata.push("seed", settings.seed);
-    match settings.integrator {
-        Integrator::Hybrid => {
-            metadata.push("integrator", "hybrid");
-            metadata.push("diffuse", format!("{:?}", settings.diffuse).to_lowercase());
-            metadata.push("error asked", format!("{} %", 100.0 * settings.error));
-        }
-        Integrator::Path { spp } => {
-            metadata.push("integrator", "path");
-            metadata.push("samples", spp);
-        }
-    }
-    for (name, value) in [("gather rays", settings.gather_rays), ("samples", settings.samples)] {
-        if let Some(value) = value {
-            metadata.push(name, value);
-        }
-    }
-    if !finished {
-        metadata.push("unfinished", "stopped before the error asked was reached");
-    }
-    metadata
 }

@@ -1,8 +1,8 @@
 //! Pictures on the way: what progressive refinement knows after 0, 1, 2, 5, 10, 20, 50 ... shots.
 
 use super::print;
-use super::render::{Picture, save};
 use crate::job::{RenderJob, with_name};
+use crate::picture::{Picture, save};
 use crate::progress::Bars;
 use anyhow::Result;
 use geometry::{Camera, Rgb, World};
@@ -35,7 +35,7 @@ pub fn take(
         let outcome = render(world, camera, Some(&solution), &settings, bars)?;
         let path = |base: &PathBuf| with_name(base, &format!("shots-{shots:05}"));
         let (output, preview) = (path(&job.output), job.preview.as_ref().map(path));
-        let picture = save(job, camera, &settings, outcome, output, preview, 0)?;
+        let picture = save(job.exposure, camera, &settings, outcome, output, preview, 0)?;
         if !job.json {
             print(&picture.line())?;
         }

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 mod classical;
 mod compare;
 mod render;
+mod sequence;
 mod solve;
 
 /// A folder for one test.
@@ -59,6 +60,20 @@ fn help_teaches() {
         }
     }
     assert!(twolight(dir.path(), &["--version"]).out.starts_with("twolight "));
+}
+
+#[test]
+fn shells_and_man_know_every_command() {
+    let dir = folder();
+    for args in [&["completions", "bash"][..], &["completions", "zsh"], &["completions", "fish"], &["man"]] {
+        let run = twolight(dir.path(), args);
+        assert_eq!(run.status, 0, "{}", run.err);
+        for command in ["render", "solve", "inspect", "compare"] {
+            assert!(run.out.contains(command), "{args:?} does not know {command}");
+        }
+    }
+    let page = twolight(dir.path(), &["man"]).out;
+    assert!(page.starts_with(".ie") && page.contains("RENDER") && page.contains("light"), "{page}");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 mod read;
 mod write;
 
-pub use read::{read_layer, read_reference, read_rgb};
+pub use read::{is_finished, read_layer, read_reference, read_rgb};
 pub use write::{write, write_rgb};
 
 use geometry::Rgb;

@@ -12,6 +12,13 @@ use std::path::{Path, PathBuf};
 /// A header of a few bytes must not make us ask the system for all its memory.
 const MOST_SAMPLES: u64 = 1 << 30;
 
+/// Whether `path` is a picture whose work was done: one that was stopped on the way says so in its header.
+pub fn is_finished(path: &Path) -> bool {
+    let Ok(meta) = ::exr::meta::MetaData::read_from_file(path, false) else { return false };
+    let unfinished = |name: &Text| *name == *"twolight:unfinished";
+    !meta.headers.iter().any(|header| header.own_attributes.other.keys().any(unfinished))
+}
+
 /// Reads the main picture: R, G, B of the first part that has them, whatever their number format; else of
 /// the first layer that has them; else a single luminance channel Y, as grey.
 pub fn read_rgb(path: &Path) -> std::result::Result<Image, Error> {

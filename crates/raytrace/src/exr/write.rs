@@ -195,7 +195,7 @@ mod tests {
     fn saved(film: &Film, metadata: &Metadata) -> (tempfile::TempDir, std::path::PathBuf) {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("film.exr");
-        write(film, metadata, &path).unwrap();
+        write(film, &[], metadata, &path).unwrap();
         (dir, path)
     }
 
@@ -247,7 +247,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("old.exr");
         std::fs::write(&path, b"precious").unwrap();
-        assert!(write(&Film::new(0, 4), &Metadata::default(), &path).is_err());
+        assert!(write(&Film::new(0, 4), &[], &Metadata::default(), &path).is_err());
         assert_eq!(std::fs::read(&path).unwrap(), b"precious");
     }
 }
