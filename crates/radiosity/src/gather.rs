@@ -4,8 +4,8 @@
 //! Which light a gather ray brings, so that every path is counted once (Heckbert's letters, from light to eye):
 //! - `L D`: at the surface y where it ends, direct light is sampled there. Counted.
 //! - `L S y`, y rough and the first surface met: sampled at y too, through y's glossy lobe. Counted.
-//! - every other `L S+ x`: the photons' part ([`crate::caustic`]). A ray that runs into a lamp brings nothing, for
-//!   pass 2 has already fetched the lamp's own light.
+//! - every other `L S+ x`: the photons' part ([`crate::caustic`]), in [`Followed::mirrored`] for those who have none. A
+//!   ray that runs straight into a lamp brings nothing, for pass 2 has already fetched the lamp's own light.
 
 use crate::element::Side;
 use crate::transport::{Landing, Row};
@@ -24,6 +24,9 @@ const LONGEST: usize = 32;
 pub struct Followed {
     /// π times the radiance that comes back of light thrown by emitters on the surfaces met, cd/m².
     pub direct: Rgb,
+    /// π times the radiance of emitters that the ray ran into by way of mirrors and glass alone, cd/m²: light that
+    /// photons bring to surfaces.
+    pub mirrored: Rgb,
     /// Distance to the first surface, m; infinite when there was none.
     pub distance: f32,
     /// The first surface met: triangle and side.
@@ -44,9 +47,15 @@ pub fn follow(
 ) -> Followed {
     let mut out = Followed { distance: f32::INFINITY, ..Followed::default() };
     let mut throughput = Rgb::WHITE;
-    let mut specular = 0;
+    let (mut specular, mut rough_first) = (0, false);
     for _ in 0..LONGEST {
-        let Some(hit) = world.bvh.closest_hit(&ray) else { return out };
+        let is_the_photons = specular > 1 || (specular == 1 && !rough_first);
+        let Some(hit) = world.bvh.closest_hit(&ray) else {
+            if let Some(sky) = world.scene.sky.as_ref().filter(|_| is_the_photons) {
+                out.mirrored += throughput * sky.radiance(ray.direction) * PI;
+            }
+            return out;
+        };
         let surface = Surface::new(&world.scene, &ray, &hit);
         if out.first.is_none() {
             out.distance = hit.t;
@@ -61,6 +70,9 @@ pub fn follow(
         }
         if surface.unlit.is_some() {
             return out;
+        }
+        if is_the_photons {
+            out.mirrored += throughput * surface.emission * PI;
         }
         let wo = -ray.direction;
         let albedo = surface.bsdf.diffuse_albedo(wo);
@@ -100,6 +112,7 @@ pub fn follow(
         throughput *= next.weight * (1.0 / (1.0 - p_diffuse));
         if !next.straight {
             specular += 1;
+            rough_first = if specular == 1 { rough } else { rough_first };
         }
         let survive = throughput.max_channel().min(1.0);
         if survive < 0.1 {

@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::exr::{self, Image, Metadata};
+use crate::false_colour::palette;
 use crate::metrics::error_map;
 use crate::tonemap::write_png;
 use geometry::Rgb;
@@ -10,17 +11,6 @@ use std::path::Path;
 /// Errors that the first and the last colour stand for. The scale is logarithmic and the same for all pictures,
 /// so that two difference pictures can be laid side by side.
 pub const SCALE: [f32; 2] = [0.001, 1.0];
-
-/// Black, violet, magenta, orange, pale yellow: six stops of matplotlib's magma (CC0), whose brightness rises
-/// evenly, so that a grey print tells the same. sRGB.
-const RAMP: [[f32; 3]; 6] = [
-    [0.0, 0.0, 4.0],
-    [59.0, 15.0, 112.0],
-    [140.0, 41.0, 129.0],
-    [222.0, 73.0, 104.0],
-    [254.0, 159.0, 109.0],
-    [252.0, 253.0, 191.0],
-];
 
 /// Writes the error of each pixel, |picture − reference| as the metric weighs it, to `path`: `.exr` gets the
 /// number itself (0.02 is 2 %) in R, G and B, every other name a false-colour PNG.
@@ -40,10 +30,7 @@ pub fn write(picture: &Image, reference: &Image, path: &Path) -> Result<(), Erro
 /// The colour of an error (a fraction), sRGB.
 pub fn false_colour(error: f32) -> [u8; 3] {
     let [lo, hi] = SCALE.map(f32::ln);
-    let at = ((error.max(SCALE[0]).ln() - lo) / (hi - lo)).clamp(0.0, 1.0) * (RAMP.len() - 1) as f32;
-    let i = (at as usize).min(RAMP.len() - 2);
-    let t = at - i as f32;
-    [0, 1, 2].map(|c| (RAMP[i][c] * (1.0 - t) + RAMP[i + 1][c] * t + 0.5) as u8)
+    palette::colour(&palette::MAGMA, (error.max(SCALE[0]).ln() - lo) / (hi - lo))
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ mod tests;
 
 pub use lookup::{coverage_at, emission_at, straight_through};
 
-use crate::bsdf::Bsdf;
+use crate::bsdf::{Bsdf, Shading};
 use crate::math::Vec3;
 use crate::{Hit, MaterialId, Ray, Rgb, Scene, Volume};
 use lookup::Point;
@@ -73,6 +73,27 @@ impl Surface {
             unlit: material.unlit.then_some(base_color),
             bsdf: Bsdf::new(&shading, normals.shading, normals.geometric, normals.front),
             volume: material.enclosed(),
+        }
+    }
+
+    /// A white Lambertian sheet at `position` that faces the unit normal `n`: the cell of a light meter, which no scene
+    /// need contain.
+    pub fn white_sheet(position: Vec3, n: Vec3) -> Surface {
+        Surface {
+            position,
+            triangle: 0,
+            u: 0.0,
+            v: 0.0,
+            front: true,
+            ng: n,
+            ns: n,
+            smooth: n,
+            material: MaterialId(0),
+            coverage: 1.0,
+            emission: Rgb::BLACK,
+            unlit: None,
+            bsdf: Bsdf::new(&Shading { base_color: Rgb::WHITE, ..Shading::LAMBERT }, n, n, true),
+            volume: None,
         }
     }
 
