@@ -1,6 +1,7 @@
 //! What pencil and paper give, within the method's stated error.
 
 mod enclosures;
+mod measure;
 mod optics;
 mod reference_data;
 mod shadows;

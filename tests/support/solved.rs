@@ -1,8 +1,13 @@
-//! Numbers of a radiosity solution: means over area.
+//! Numbers of a radiosity solution, means over area; and illuminance without one.
 
-use geometry::{Rgb, World};
+use geometry::math::{offset_origin, to_world};
+use geometry::sampling::{Rng, cosine_hemisphere};
+use geometry::{Ray, Rgb, World};
 use radiosity::Solution;
 use radiosity::element::Side;
+use rayon::prelude::*;
+use raytrace::integrator::path;
+use raytrace::measure::Sensor;
 
 /// Points on each side of a triangle's parametrisation: the error of a mean is that of a midpoint rule with 64 cells.
 const CELLS: usize = 8;
@@ -23,6 +28,21 @@ pub fn area_mean(world: &World, of: impl Fn(u32) -> bool, value: impl Fn(u32, f3
 /// Area mean of the indirect irradiance on all fronts, lx.
 pub fn indirect_mean(world: &World, solution: &Solution) -> f64 {
     area_mean(world, |_| true, |t, u, v| solution.irradiance(world, t, u, v, Side::Front))
+}
+
+/// Illuminance (lx) at a sensor by `paths` paths of the path tracer, which sees no solution, and its standard error.
+pub fn by_paths(world: &World, sensor: &Sensor, paths: u32, seed: u64) -> (f64, f64) {
+    let one = |i: u32| {
+        let mut rng = Rng::new(seed, u64::from(i));
+        let wi = to_world(cosine_hemisphere(rng.vec2()), sensor.normal);
+        let ray = Ray::new(offset_origin(sensor.position, sensor.normal), wi);
+        std::f64::consts::PI * f64::from(path::radiance(world, ray, &mut rng).0.total().luminance())
+    };
+    let found: Vec<f64> = (0..paths).into_par_iter().map(one).collect();
+    let n = f64::from(paths);
+    let mean = found.iter().sum::<f64>() / n;
+    let square = found.iter().map(|e| (e - mean).powi(2)).sum::<f64>();
+    (mean, square.sqrt() / n)
 }
 
 /// Centres of equal parts of a triangle: the upper half of a grid of squares is folded onto the lower.

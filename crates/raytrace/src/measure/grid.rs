@@ -3,7 +3,8 @@
 use super::Sensor;
 use geometry::math::to_world;
 use geometry::sampling::Lattice2;
-use geometry::{Hit, Ray, Vec2, Vec3, World};
+use geometry::{Ray, Vec2, Vec3, World};
+use rayon::prelude::*;
 
 /// Rays that look around a point.
 const LOOKS: u32 = 64;
@@ -88,24 +89,23 @@ impl Grid {
         self.corner + self.across * s + self.up * t
     }
 
-    /// A sensor in each cell that is not within an object.
-    pub fn sensors(&self, world: &World) -> Vec<Option<Sensor>> {
-        let sensor = |i| Sensor::at(world, self.point(i), self.normal());
-        (0..self.len()).map(|i| Some(sensor(i)).filter(|s| is_free(world, s))).collect()
-    }
-
-    /// The same for a work plane: only what also has a floor under it.
-    pub fn sensors_over_floor(&self, world: &World) -> Vec<Option<Sensor>> {
-        let over_floor = |s: &Sensor| has_floor(world, s);
-        self.sensors(world).into_iter().map(|s| s.filter(over_floor)).collect()
+    /// A sensor in each cell that `keep` lets stay.
+    pub fn sensors(&self, world: &World, keep: impl Fn(&Sensor) -> bool + Sync) -> Vec<Option<Sensor>> {
+        let sensor = |i| Some(Sensor::at(world, self.point(i), self.normal())).filter(&keep);
+        (0..self.len()).into_par_iter().map(sensor).collect()
     }
 }
 
 /// Whether a sensor is in the open, and not in the inside of something (or behind the walls of a room without
-/// thickness): of rays in all directions that meet something, at most half meet a back side. Materials that are
-/// double-sided have none.
+/// thickness): what is straight above shows its front, and so do at least half of the surfaces that rays in all
+/// directions meet. Materials that are double-sided have no back.
+///
+/// The ray upward is for furniture that stands flush to a wall: of two faces in one place it is chance which one a ray meets.
 pub fn is_free(world: &World, sensor: &Sensor) -> bool {
     let from = lifted(world, sensor);
+    if shows_front(world, Ray::new(from, Vec3::Y)) == Some(false) {
+        return false;
+    }
     let pattern = Lattice2::new(LOOKS);
     let (mut met, mut backs) = (0, 0);
     for i in 0..LOOKS {
@@ -113,28 +113,29 @@ pub fn is_free(world: &World, sensor: &Sensor) -> bool {
         let z = 1.0 - 2.0 * u.x;
         let (r, phi) = ((1.0 - z * z).max(0.0).sqrt(), std::f32::consts::TAU * u.y);
         let ray = Ray::new(from, to_world(Vec3::new(r * phi.cos(), r * phi.sin(), z), sensor.normal));
-        if let Some(hit) = world.closest(&ray) {
+        if let Some(front) = shows_front(world, ray) {
             met += 1;
-            backs += u32::from(is_back(world, &ray, &hit));
+            backs += u32::from(!front);
         }
     }
     2 * backs <= met
 }
 
 /// Whether straight below lies something, front up.
-fn has_floor(world: &World, sensor: &Sensor) -> bool {
-    let ray = Ray::new(lifted(world, sensor), Vec3::NEG_Y);
-    world.closest(&ray).is_some_and(|hit| !is_back(world, &ray, &hit))
+pub fn has_floor(world: &World, sensor: &Sensor) -> bool {
+    shows_front(world, Ray::new(lifted(world, sensor), Vec3::NEG_Y)) == Some(true)
 }
 
 fn lifted(world: &World, sensor: &Sensor) -> Vec3 {
     sensor.position + sensor.normal * (1e-4 * world.scale)
 }
 
-fn is_back(world: &World, ray: &Ray, hit: &Hit) -> bool {
+/// Whether the ray meets a front; `None` where it meets nothing.
+fn shows_front(world: &World, ray: Ray) -> Option<bool> {
+    let hit = world.closest(&ray)?;
     let mesh = &world.scene.mesh;
     let material = &world.scene.materials[mesh.materials[hit.triangle as usize].0 as usize];
-    !material.double_sided && mesh.geometric_normal(hit.triangle).dot(ray.direction) > 0.0
+    Some(material.double_sided || mesh.geometric_normal(hit.triangle).dot(ray.direction) <= 0.0)
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! Illuminance at one point: direct light by shadow rays, the rest by rays that read the solution where they end.
 //!
 //! In Heckbert's letters, from light to sensor, each path once: `L x` by light samples; `L (D|S)* D S* x` by gather rays;
-//! `L S+ x` on a diffuse surface by the solution's photons, and in mid-air, where no photon lands, by the same gather
-//! rays where they run into an emitter. These find no lamp without extent (point, spot, sun) in a mirror or through
-//! glass that bends light: in mid-air such light is not measured.
+//! `L S+ x` by the same gather rays where they run into an emitter. These find no lamp without extent (point, spot, sun)
+//! in a mirror or through glass that bends light, and a small one seldom. On a diffuse surface the solution's photons
+//! stand in for them then; in mid-air, where no photon lands, such light is not measured.
 
 use crate::direct::{Gloss, Plan, Spend, direct};
 use geometry::math::{offset_origin, to_world};
@@ -16,13 +16,15 @@ use rayon::prelude::*;
 /// Independent estimates at least, from whose spread the standard error is read: with 8 it is known to a quarter.
 const FEWEST: u32 = 8;
 /// And at most, where light is hard to find: a sensor costs so much and no more.
-const MOST: u32 = 64;
+const MOST: u32 = 128;
 /// Shadow rays of one estimate for a lamp that brings all of the light.
 const SHADOW_RAYS: u32 = 64;
 /// The standard error may be this share of the error asked, so that about 95 of 100 readings keep to it.
 const DOUBT: f32 = 0.5;
 /// Standard error of an estimate by photons: of the 80 that it takes the kernel leaves 60 effective ones.
 const PHOTON_NOISE: f32 = 0.13;
+/// So many rays that ran into an emitter by way of mirrors and glass tell as much as those photons.
+const ENOUGH: u32 = 64;
 /// A sensor this near a surface that faces its way lies on it, in units of the size of the rooms: 1 mm in one of 10 m.
 const TOUCHING: f32 = 1e-4;
 
@@ -87,6 +89,8 @@ pub struct Meter<'a> {
     error: f32,
     seed: u64,
     pattern: Lattice2,
+    /// Whether some lamp has no extent.
+    has_points: bool,
 }
 
 impl<'a> Meter<'a> {
@@ -95,7 +99,8 @@ impl<'a> Meter<'a> {
     /// The rays of one estimate are chosen so that eight of them suffice in a furnished room.
     pub fn new(world: &'a World, solution: &'a Solution, error: f32, seed: u64) -> Meter<'a> {
         let rays = (128.0 * (0.01 / error.clamp(1e-4, 1.0)).powf(1.25)).clamp(16.0, 2048.0);
-        Meter { world, solution, error, seed, pattern: Lattice2::new((rays as u32).next_multiple_of(8)) }
+        let pattern = Lattice2::new((rays as u32).next_multiple_of(8));
+        Meter { world, solution, error, seed, pattern, has_points: !world.scene.lights.is_empty() }
     }
 
     /// Reads all of `sensors`, over threads; number `first` + i seeds the i-th. `None` for those not reached when
@@ -113,37 +118,49 @@ impl<'a> Meter<'a> {
     pub fn read(&self, sensor: &Sensor, stream: u64) -> Reading {
         let sheet = Surface::white_sheet(sensor.position, sensor.normal);
         let plan = Plan::new(self.world, sensor.position, sensor.normal, SHADOW_RAYS);
-        let (mut mean, mut square) = (Reading::default(), 0f64);
-        let mut estimates = 0;
+        let photons = if sensor.on_surface {
+            self.solution.caustics.irradiance(sensor.position, sensor.normal)
+        } else {
+            Rgb::BLACK
+        };
+        let by_photons = |found: u32| !photons.is_black() && (self.has_points || found < ENOUGH);
+        let mut mean = Reading::default();
+        // Of all that the rays find, and without what the photons may stand in for.
+        let (mut whole, mut rest) = (Spread::default(), Spread::default());
+        let (mut estimates, mut found) = (0, 0);
         while estimates < MOST {
             let mut rng = Rng::new(self.seed ^ 0x6d65_7465_72, (stream << 8) | u64::from(estimates));
-            let one = self.estimate(sensor, &sheet, &plan, &mut rng);
+            let (one, mirrored) = self.estimate(sensor, &sheet, &plan, &mut rng);
             estimates += 1;
-            let before = f64::from(mean.illuminance());
+            found += mirrored;
             let share = 1.0 / estimates as f32;
             mean.direct = mean.direct.lerp(one.direct, share);
             mean.indirect = mean.indirect.lerp(one.indirect, share);
             mean.specular = mean.specular.lerp(one.specular, share);
-            let (y, after) = (f64::from(one.illuminance()), f64::from(mean.illuminance()));
-            square += (y - before) * (y - after);
-            let n = f64::from(estimates);
-            mean.standard_error = (square.max(0.0) / (n * (n - 1.0).max(1.0))).sqrt() as f32;
-            if estimates >= FEWEST && mean.standard_error <= DOUBT * self.error * mean.illuminance() {
+            whole.add(one.illuminance());
+            rest.add((one.direct + one.indirect).luminance());
+            let spread = if by_photons(found) { &rest } else { &whole };
+            let goal = DOUBT * self.error * mean.illuminance();
+            if estimates >= FEWEST && spread.standard_error() <= goal {
                 break;
             }
         }
-        if sensor.on_surface {
-            mean.specular = self.solution.caustics.irradiance(sensor.position, sensor.normal);
-            mean.standard_error = mean.standard_error.hypot(PHOTON_NOISE * mean.specular.luminance());
+        if by_photons(found) {
+            mean.specular = photons;
+            mean.standard_error = rest.standard_error().hypot(PHOTON_NOISE * photons.luminance());
+        } else {
+            mean.standard_error = whole.standard_error();
         }
         mean
     }
 
-    fn estimate(&self, sensor: &Sensor, sheet: &Surface, plan: &Plan, rng: &mut Rng) -> Reading {
-        let Sensor { position, normal, on_surface } = *sensor;
+    /// One estimate, and the number of rays that ran into an emitter by way of mirrors and glass.
+    fn estimate(&self, sensor: &Sensor, sheet: &Surface, plan: &Plan, rng: &mut Rng) -> (Reading, u32) {
+        let Sensor { position, normal, .. } = *sensor;
         let spend = Spend { samples: SHADOW_RAYS, phase: rng.below(16), places: &[position] };
         let straight = direct(self.world, sheet, normal, plan, Gloss::None, spend, rng);
         let mut out = Reading { direct: straight.irradiance, ..Reading::default() };
+        let mut found = 0;
         let shift = rng.vec2();
         let share = 1.0 / self.pattern.len() as f32;
         for i in 0..self.pattern.len() {
@@ -157,10 +174,31 @@ impl<'a> Meter<'a> {
                         + self.solution.caustic(self.world, t, u, v, side));
             });
             out.indirect += (followed.direct + reflected) * share;
-            if !on_surface {
-                out.specular += followed.mirrored * share;
-            }
+            out.specular += followed.mirrored * share;
+            found += u32::from(!followed.mirrored.is_black());
         }
-        out
+        (out, found)
+    }
+}
+
+/// Mean and spread of numbers as they come (Welford, Technometrics 4, 1962).
+#[derive(Clone, Copy, Debug, Default)]
+struct Spread {
+    count: f64,
+    mean: f64,
+    square: f64,
+}
+
+impl Spread {
+    fn add(&mut self, v: f32) {
+        let step = f64::from(v) - self.mean;
+        self.count += 1.0;
+        self.mean += step / self.count;
+        self.square += step * (f64::from(v) - self.mean);
+    }
+
+    /// Of the mean.
+    fn standard_error(&self) -> f32 {
+        (self.square.max(0.0) / (self.count * (self.count - 1.0).max(1.0))).sqrt() as f32
     }
 }
