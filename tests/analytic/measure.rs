@@ -133,7 +133,9 @@ fn in_a_sphere_what_bounces_is_even() {
     let area: f32 = (0..world.scene.mesh.triangles.len() as u32).map(|t| world.scene.mesh.area(t)).sum();
     let exact = flux * rho / (area * (1.0 - rho));
     let meter = Meter::new(&world, &solution, ERROR, 1);
-    for sheet in surface::sheets(&world, &solution, &surface::triangles_named(&world.scene, "part 0"), 2.0) {
+    for sheet in
+        surface::sheets(&world, &solution, &surface::triangles_named(&world.scene, "part 0"), 2.0, false)
+    {
         let sensors: Vec<Sensor> = sheet.places.iter().flatten().map(|p| p.sensor).collect();
         assert!(sensors.len() >= 60 && sheet.grid.is_none());
         let readings: Vec<Reading> = meter.read_all(&sensors, 0, &()).into_iter().flatten().collect();
@@ -259,7 +261,7 @@ fn surfaces_are_found_by_name() {
     let solution = solved(&world);
     let floor = surface::triangles_named(&world.scene, "floor");
     assert_eq!(floor.len(), 4);
-    let sheets = surface::sheets(&world, &solution, &floor, 0.5);
+    let sheets = surface::sheets(&world, &solution, &floor, 0.5, false);
     let [sheet] = &sheets[..] else { panic!("only the front is lit: {}", sheets.len()) };
     let grid = sheet.grid.expect("it is flat");
     assert_eq!((grid.columns, grid.rows, sheet.places.iter().flatten().count()), (8, 8, 48));

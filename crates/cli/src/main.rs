@@ -28,6 +28,8 @@ fn main() -> ExitCode {
         Command::Render(args) => commands::render::run(*args),
         Command::Solve(args) => commands::solve::run(&args),
         Command::Inspect(args) => commands::inspect::run(&args),
+        Command::Measure(args) => commands::measure::run(*args),
+        Command::FalseColour(args) => commands::false_colour::run(&args),
         Command::Compare(args) => commands::compare::run(&args),
         Command::Completions { shell } => commands::manual::completions(shell),
         Command::Man => commands::manual::page(),

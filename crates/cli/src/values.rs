@@ -136,6 +136,51 @@ pub fn strength(s: &str) -> Result<f32, String> {
     if value < 0.0 { Err("it must not be negative".into()) } else { Ok(value) }
 }
 
+/// A finite number above 0.
+pub fn length(s: &str) -> Result<f32, String> {
+    let value = number(s)?;
+    if value > 0.0 { Ok(value) } else { Err("it must be above 0".into()) }
+}
+
+/// A point or a direction: "1,0.85,-2".
+pub fn vector(s: &str) -> Result<Vec3, String> {
+    let numbers = numbers(s)?;
+    match numbers[..] {
+        [x, y, z] => Ok(Vec3::new(x, y, z)),
+        _ => Err(format!("{s:?} is no X,Y,Z")),
+    }
+}
+
+/// A rectangle, corner and two edges: "0,1,0 4,0,0 0,2,0".
+pub fn rectangle(s: &str) -> Result<[Vec3; 3], String> {
+    let vectors: Vec<Vec3> = s.split_whitespace().map(vector).collect::<Result<_, _>>()?;
+    let [corner, across, up] = vectors[..] else {
+        return Err("write corner, lower edge and left edge: \"X,Y,Z X,Y,Z X,Y,Z\"".into());
+    };
+    let cos = across.normalize_or_zero().dot(up.normalize_or_zero());
+    match cos.abs() < 1e-3 {
+        true => Ok([corner, across, up]),
+        false => Err("the edges must be at right angles".into()),
+    }
+}
+
+/// Values for lines to be drawn at.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Levels(pub Vec<f64>);
+
+/// Levels: "100,200,300", or "none".
+pub fn levels(s: &str) -> Result<Levels, String> {
+    if s == "none" {
+        return Ok(Levels::default());
+    }
+    let levels = numbers(s)?.into_iter().map(f64::from).collect();
+    Ok(Levels(levels))
+}
+
+fn numbers(s: &str) -> Result<Vec<f32>, String> {
+    s.split(',').map(number).collect()
+}
+
 /// Any finite number.
 pub fn number(s: &str) -> Result<f32, String> {
     let value = s.trim().parse::<f32>().ok().filter(|v| v.is_finite());
@@ -197,6 +242,17 @@ mod tests {
         for bad in ["", "Lamp", "=1", "Lamp=", "Lamp=-1", "Lamp=1,2", "Lamp=inf"] {
             assert!(light(bad).is_err(), "{bad}");
         }
+    fn points_and_rectangles_are_in_metres() {
+        assert_eq!(vector("1, -2,.5"), Ok(Vec3::new(1.0, -2.0, 0.5)));
+        assert!(vector("1,2").is_err() && vector("1,2,x").is_err() && vector("1,2,inf").is_err());
+        assert_eq!(rectangle("0,1,0 4,0,0  0,0,-2"), Ok([Vec3::Y, Vec3::X * 4.0, Vec3::NEG_Z * 2.0]));
+        assert!(
+            rectangle("0,1,0 4,0,0").is_err()
+                && rectangle("0,1,0 4,0,0 1,1,0").unwrap_err().contains("right")
+        );
+        assert_eq!(levels("100,2.5"), Ok(Levels(vec![100.0, 2.5])));
+        assert_eq!(levels("none"), Ok(Levels(vec![])));
+        assert!(levels("1,,2").is_err() && length("0").is_err());
     }
 
     #[test]

@@ -1,13 +1,17 @@
 //! What was typed: a file for each subcommand, and here what several share.
 
 mod compare;
+mod false_colour;
 mod inspect;
+mod measure;
 mod render;
 mod solve;
 mod views;
 
 pub use compare::CompareArgs;
+pub use false_colour::{FalseColourArgs, FalseColourCommand, ScaleArg};
 pub use inspect::InspectArgs;
+pub use measure::MeasureArgs;
 pub use render::{DiffuseArg, IntegratorArg, RenderArgs, SolverArg};
 pub use solve::SolveArgs;
 pub use views::ViewArgs;
@@ -43,6 +47,10 @@ pub enum Command {
     Solve(SolveArgs),
     /// Show what is in a scene, what lights it, and what is wrong with it
     Inspect(InspectArgs),
+    /// Measure illuminance in a scene, in lx: at points, on planes and on surfaces
+    Measure(Box<MeasureArgs>),
+    /// Show the luminance or illuminance of a picture in false colour
+    FalseColour(FalseColourCommand),
     /// Measure how far a picture is from a reference
     Compare(CompareArgs),
     /// Print completions for a shell: source <(twolight completions bash)

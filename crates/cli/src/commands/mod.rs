@@ -1,8 +1,10 @@
 //! One file for each subcommand.
 
 pub mod compare;
+pub mod false_colour;
 pub mod inspect;
 pub mod manual;
+pub mod measure;
 pub mod render;
 mod snapshots;
 pub mod solve;

@@ -27,13 +27,16 @@ pub fn line(field: &Field, level: f32) -> Vec<f32> {
     out
 }
 
+/// Middle and size of a number, pixels.
+pub type Label = ((usize, usize), (usize, usize));
+
 /// A pixel on the line `covered` where a number of `size` pixels has room: on the longest free stretch, away from the
-/// border and from what is `taken`, as (middle, size) each.
+/// border and from what is `taken`.
 pub fn label(
     field: &Field,
     covered: &[f32],
     size: (usize, usize),
-    taken: &[((usize, usize), (usize, usize))],
+    taken: &[Label],
 ) -> Option<(usize, usize)> {
     let (w, h) = size;
     let Field { width, height, .. } = *field;

@@ -129,7 +129,7 @@ impl<'a> Meter<'a> {
         let (mut whole, mut rest) = (Spread::default(), Spread::default());
         let (mut estimates, mut found) = (0, 0);
         while estimates < MOST {
-            let mut rng = Rng::new(self.seed ^ 0x6d65_7465_72, (stream << 8) | u64::from(estimates));
+            let mut rng = Rng::new(self.seed ^ 0x006d_6574_6572, (stream << 8) | u64::from(estimates));
             let (one, mirrored) = self.estimate(sensor, &sheet, &plan, &mut rng);
             estimates += 1;
             found += mirrored;

@@ -62,9 +62,15 @@ pub fn names(scene: &Scene) -> Vec<&str> {
 }
 
 /// The lit sides of `triangles`, about one point for `spacing`² m²: on a grid where they lie in one plane, else spread
-/// over their area.
-pub fn sheets(world: &World, solution: &Solution, triangles: &[u32], spacing: f32) -> Vec<Sheet> {
-    let of = |side| sheet(world, triangles, side, spacing);
+/// over their area. With `keep_all` also places within objects.
+pub fn sheets(
+    world: &World,
+    solution: &Solution,
+    triangles: &[u32],
+    spacing: f32,
+    keep_all: bool,
+) -> Vec<Sheet> {
+    let of = |side| sheet(world, triangles, side, spacing, keep_all);
     let sheets = [of(Side::Front), of(Side::Back)];
     let light = |sheet: &Sheet| {
         let places = || sheet.places.iter().flatten();
@@ -82,14 +88,14 @@ pub fn sheets(world: &World, solution: &Solution, triangles: &[u32], spacing: f3
     sheets.into_iter().enumerate().filter(|(i, _)| is_lit(*i)).map(|(_, sheet)| sheet).collect()
 }
 
-fn sheet(world: &World, triangles: &[u32], side: Side, spacing: f32) -> Sheet {
+fn sheet(world: &World, triangles: &[u32], side: Side, spacing: f32, keep_all: bool) -> Sheet {
     let mesh = &world.scene.mesh;
     let place = |(triangle, uv): (u32, [f32; 2])| {
         let normal = mesh.geometric_normal(triangle) * side.sign();
         let surface = seen(world, triangle, uv, normal);
         let on_surface = surface.bsdf.has_diffuse();
         let sensor = Sensor { position: surface.position, normal, on_surface };
-        Some(Place { sensor, triangle, uv, side }).filter(|p| is_free(world, &p.sensor))
+        Some(Place { sensor, triangle, uv, side }).filter(|p| keep_all || is_free(world, &p.sensor))
     };
     match plane(mesh, triangles, side, spacing) {
         Some(grid) => {

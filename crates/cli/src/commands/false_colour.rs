@@ -1,0 +1,60 @@
+//! `twolight false-colour`: the luminance of a picture, or of one of its layers, by a scale.
+
+use crate::args::{FalseColourArgs, FalseColourCommand, ScaleArg};
+use crate::commands::print;
+use crate::job::AskedWrongly;
+use anyhow::Result;
+use raytrace::exr;
+use raytrace::false_colour::{Chart, Field};
+use raytrace::output::check_writable;
+use std::process::ExitCode;
+
+/// Share of a picture's pixels that may be brighter than its scale: lamps, mostly.
+const LAMPS: f64 = 0.01;
+
+/// Runs the command.
+pub fn run(args: &FalseColourCommand) -> Result<ExitCode> {
+    if !args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
+        return Err(AskedWrongly(format!("{} is written as PNG: name it .png", args.output.display())).into());
+    }
+    check_writable(&args.output)?;
+    let image = match args.layer.as_deref() {
+        None | Some("luminance") => exr::read_rgb(&args.picture)?,
+        Some(layer) => exr::read_layer(&args.picture, layer)?,
+    };
+    let (what, unit) = match args.layer.as_deref() {
+        Some("irradiance") => ("Illuminance", "lx"),
+        Some("depth" | "position") => ("Distance", "m"),
+        Some("albedo" | "normal" | "variance") => ("Value", ""),
+        _ => ("Luminance", "cd/m\u{b2}"),
+    };
+    let field = Field::of_picture(&image);
+    let [mean, max] = [mean(&field), field.quantile(1.0)];
+    let mut chart = chart(field, &args.colours, LAMPS);
+    let layer = args.layer.as_ref().filter(|l| *l != "luminance" && *l != "irradiance");
+    chart.title = layer.map_or(what.to_string(), |layer| format!("{what}, {layer}"));
+    chart.unit = unit.into();
+    let beyond = if max > chart.scale.high() { ", beyond the scale" } else { "" };
+    chart.caption = vec![format!("mean {mean:.4}   max {max:.4} {unit}{beyond}")];
+    chart.write(&args.output)?;
+    let ascii = unit.replace('\u{b2}', "2");
+    print(&format!(
+        "{}: {what} up to {} {ascii} (mean {mean:.4}, max {max:.4})",
+        args.output.display(),
+        chart.scale.high()
+    ))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A chart of `field` as asked; `clip`: see [`Chart::new`].
+pub fn chart(field: Field, colours: &FalseColourArgs, clip: f64) -> Chart {
+    let most = colours.max.map(f64::from);
+    let mut chart = Chart::new(field, colours.scale == ScaleArg::Log, most, clip);
+    chart.isolines = colours.isolines.clone().unwrap_or_default().0;
+    chart
+}
+
+fn mean(field: &Field) -> f64 {
+    let finite = || field.values.iter().filter(|v| v.is_finite()).map(|v| f64::from(*v));
+    finite().sum::<f64>() / finite().count().max(1) as f64
+}
