@@ -33,10 +33,13 @@ pub struct MeasureArgs {
     /// Measure at the points of this file; those without a normal face up
     #[arg(long, value_name = "FILE.csv")]
     pub points: Option<PathBuf>,
-    /// Measure on a level plane at this height over the scene's lowest point; may be repeated
+    /// Measure on a level plane at this height over the floor; may be repeated
     #[arg(long, value_name = "HEIGHT", allow_negative_numbers = true, value_parser = values::number)]
     pub workplane: Vec<f32>,
-    /// Leave out this width along the edges of --workplane
+    /// Height of the floor (y); the largest level with a room's height above it if absent
+    #[arg(long, value_name = "Y", requires = "workplane", allow_negative_numbers = true, value_parser = values::number)]
+    pub floor: Option<f32>,
+    /// Leave out of --workplane what is nearer than this to a wall, or to anything else that stands as high
     #[arg(long, value_name = "METRES", default_value = "0", requires = "workplane", value_parser = values::strength)]
     pub margin: f32,
     /// Measure on a rectangle: its lower left corner, lower edge and left edge, as its sensors see it; may be repeated

@@ -5,24 +5,28 @@
 //! in a mirror or through glass that bends light, and a small one seldom. On a diffuse surface the solution's photons
 //! stand in for them then; in mid-air, where no photon lands, such light is not measured.
 
+use super::Statistics;
 use crate::direct::{Gloss, Plan, Spend, direct};
 use geometry::math::{offset_origin, to_world};
 use geometry::sampling::{Lattice2, Rng, cosine_hemisphere};
-use geometry::{Ray, Rgb, Surface, Vec3, World};
+use geometry::{Hit, Ray, Rgb, Surface, Vec3, World};
+use radiosity::element::Side;
 use radiosity::gather::follow;
 use radiosity::{Progress, Solution};
 use rayon::prelude::*;
 
-/// Independent estimates at least, from whose spread the standard error is read: with 8 it is known to a quarter.
-const FEWEST: u32 = 8;
+/// Independent estimates at least, from whose spread the standard error is read: with 32 it is known to an eighth.
+const FEWEST: u32 = 32;
 /// And at most, where light is hard to find: a sensor costs so much and no more.
-const MOST: u32 = 128;
+const MOST: u32 = 256;
 /// Shadow rays of one estimate for a lamp that brings all of the light.
-const SHADOW_RAYS: u32 = 64;
+const SHADOW_RAYS: u32 = 16;
 /// The standard error may be this share of the error asked, so that about 95 of 100 readings keep to it.
 const DOUBT: f32 = 0.5;
 /// Standard error of an estimate by photons: of the 80 that it takes the kernel leaves 60 effective ones.
 const PHOTON_NOISE: f32 = 0.13;
+/// Rays one after the other at most where the mesh does not resolve the light.
+const DEEPEST: u32 = 4;
 /// So many rays that ran into an emitter by way of mirrors and glass tell as much as those photons.
 const ENOUGH: u32 = 64;
 /// A sensor this near a surface that faces its way lies on it, in units of the size of the rooms: 1 mm in one of 10 m.
@@ -96,62 +100,76 @@ pub struct Meter<'a> {
 impl<'a> Meter<'a> {
     /// For readings whose noise is below `error` (0.01 is 1 %), as far as [`MOST`] estimates go.
     ///
-    /// The rays of one estimate are chosen so that eight of them suffice in a furnished room.
+    /// The rays of one estimate are chosen so that [`FEWEST`] of them suffice in most rooms.
     pub fn new(world: &'a World, solution: &'a Solution, error: f32, seed: u64) -> Meter<'a> {
-        let rays = (128.0 * (0.01 / error.clamp(1e-4, 1.0)).powf(1.25)).clamp(16.0, 2048.0);
+        let rays = (64.0 * (0.01 / error.clamp(1e-4, 1.0)).powf(1.25)).clamp(16.0, 2048.0);
         let pattern = Lattice2::new((rays as u32).next_multiple_of(8));
         Meter { world, solution, error, seed, pattern, has_points: !world.scene.lights.is_empty() }
     }
 
-    /// Reads all of `sensors`, over threads; number `first` + i seeds the i-th. `None` for those not reached when
-    /// `progress` said stop.
-    pub fn read_all(&self, sensors: &[Sensor], first: u64, progress: &dyn Progress) -> Vec<Option<Reading>> {
-        let read = |(i, sensor): (usize, &Sensor)| {
-            let reading = (!progress.stopped()).then(|| self.read(sensor, first + i as u64));
-            progress.advance(1);
-            reading
-        };
-        sensors.par_iter().enumerate().map(read).collect()
+    /// Reads all of `sensors`, over threads; number `first` + i seeds the i-th. `None` when `progress` said stop. It hears
+    /// of one step for each sensor.
+    ///
+    /// All get the same number of estimates, doubled until their noise together is what was asked: a sensor that
+    /// stopped by itself where it seems to know enough would leave out what few rays find, and read 1 % too dark in a
+    /// furnished room.
+    pub fn read_all(&self, sensors: &[Sensor], first: u64, progress: &dyn Progress) -> Option<Vec<Reading>> {
+        let mut tallies = vec![Tally::default(); sensors.len()];
+        let (mut done, mut wanted) = (0, FEWEST);
+        loop {
+            let add = |(i, (sensor, tally)): (usize, (&Sensor, &mut Tally))| {
+                if !progress.stopped() {
+                    self.add(sensor, first + i as u64, done..wanted, tally);
+                }
+                progress.advance(u64::from(done == 0));
+            };
+            sensors.par_iter().zip(&mut tallies).enumerate().for_each(add);
+            if progress.stopped() {
+                return None;
+            }
+            let read = |(sensor, tally): (&Sensor, &Tally)| self.reading(sensor, tally);
+            let readings: Vec<Reading> = sensors.par_iter().zip(&tallies).map(read).collect();
+            let noise = Statistics::of_readings(&readings).noise;
+            if noise <= f64::from(DOUBT * self.error) || wanted >= MOST {
+                return Some(readings);
+            }
+            (done, wanted) = (wanted, 2 * wanted);
+        }
     }
 
     /// Reads one sensor; `stream` seeds it.
     pub fn read(&self, sensor: &Sensor, stream: u64) -> Reading {
+        self.read_all(&[*sensor], stream, &()).and_then(|r| r.first().copied()).unwrap_or_default()
+    }
+
+    /// Adds the estimates of these numbers to what is known at a sensor.
+    fn add(&self, sensor: &Sensor, stream: u64, numbers: std::ops::Range<u32>, tally: &mut Tally) {
         let sheet = Surface::white_sheet(sensor.position, sensor.normal);
         let plan = Plan::new(self.world, sensor.position, sensor.normal, SHADOW_RAYS);
-        let photons = if sensor.on_surface {
-            self.solution.caustics.irradiance(sensor.position, sensor.normal)
-        } else {
-            Rgb::BLACK
-        };
-        let by_photons = |found: u32| !photons.is_black() && (self.has_points || found < ENOUGH);
-        let mut mean = Reading::default();
-        // Of all that the rays find, and without what the photons may stand in for.
-        let (mut whole, mut rest) = (Spread::default(), Spread::default());
-        let (mut estimates, mut found) = (0, 0);
-        while estimates < MOST {
-            let mut rng = Rng::new(self.seed ^ 0x006d_6574_6572, (stream << 8) | u64::from(estimates));
-            let (one, mirrored) = self.estimate(sensor, &sheet, &plan, &mut rng);
-            estimates += 1;
-            found += mirrored;
-            let share = 1.0 / estimates as f32;
-            mean.direct = mean.direct.lerp(one.direct, share);
-            mean.indirect = mean.indirect.lerp(one.indirect, share);
-            mean.specular = mean.specular.lerp(one.specular, share);
-            whole.add(one.illuminance());
-            rest.add((one.direct + one.indirect).luminance());
-            let spread = if by_photons(found) { &rest } else { &whole };
-            let goal = DOUBT * self.error * mean.illuminance();
-            if estimates >= FEWEST && spread.standard_error() <= goal {
-                break;
+        for number in numbers {
+            let mut rng = Rng::new(self.seed ^ 0x006d_6574_6572, (stream << 12) | u64::from(number));
+            let (one, found) = self.estimate(sensor, &sheet, &plan, &mut rng);
+            let share = 1.0 / (number + 1) as f32;
+            tally.mean.direct = tally.mean.direct.lerp(one.direct, share);
+            tally.mean.indirect = tally.mean.indirect.lerp(one.indirect, share);
+            tally.mean.specular = tally.mean.specular.lerp(one.specular, share);
+            tally.whole.add(one.illuminance());
+            tally.rest.add((one.direct + one.indirect).luminance());
+            tally.found += found;
+        }
+    }
+
+    /// What the estimates come to; photons stand in where rays tell less.
+    fn reading(&self, sensor: &Sensor, tally: &Tally) -> Reading {
+        if sensor.on_surface && (self.has_points || tally.found < ENOUGH) {
+            let photons = self.solution.caustics.irradiance(sensor.position, sensor.normal);
+            if !photons.is_black() {
+                let noise = PHOTON_NOISE * photons.luminance();
+                let standard_error = tally.rest.standard_error().hypot(noise);
+                return Reading { specular: photons, standard_error, ..tally.mean };
             }
         }
-        if by_photons(found) {
-            mean.specular = photons;
-            mean.standard_error = rest.standard_error().hypot(PHOTON_NOISE * photons.luminance());
-        } else {
-            mean.standard_error = whole.standard_error();
-        }
-        mean
+        Reading { standard_error: tally.whole.standard_error(), ..tally.mean }
     }
 
     /// One estimate, and the number of rays that ran into an emitter by way of mirrors and glass.
@@ -166,19 +184,61 @@ impl<'a> Meter<'a> {
         for i in 0..self.pattern.len() {
             let wi = to_world(cosine_hemisphere(self.pattern.point(i, shift)), normal);
             let ray = Ray::new(offset_origin(position, normal), wi);
-            let mut reflected = Rgb::BLACK;
-            let followed = follow(self.world, ray, rng, |hit, side, weight| {
-                let (t, u, v) = (hit.triangle, hit.u, hit.v);
-                reflected += weight
-                    * (self.solution.irradiance(self.world, t, u, v, side)
-                        + self.solution.caustic(self.world, t, u, v, side));
-            });
-            out.indirect += (followed.direct + reflected) * share;
+            let mut landings = Landings::default();
+            let followed = follow(self.world, ray, rng, |hit, side, weight| landings.push(hit, side, weight));
+            out.indirect += (followed.direct + self.reflected(&landings, 0, rng)) * share;
             out.specular += followed.mirrored * share;
             found += u32::from(!followed.mirrored.is_black());
         }
         (out, found)
     }
+
+    /// π times the radiance that comes back from where a ray landed of light that was there before, cd/m².
+    fn reflected(&self, landings: &Landings, depth: u32, rng: &mut Rng) -> Rgb {
+        let of = |(hit, side, weight): (Hit, Side, Rgb)| weight * self.indirect(&hit, side, depth, rng);
+        landings.at.into_iter().flatten().map(of).sum()
+    }
+
+    /// Irradiance (lx) on a place of a surface of all but the emitters' own light: the solution's, or by a further ray
+    /// where its mesh does not resolve the light.
+    fn indirect(&self, hit: &Hit, side: Side, depth: u32, rng: &mut Rng) -> Rgb {
+        let (world, t, u, v) = (self.world, hit.triangle, hit.u, hit.v);
+        let caustic = self.solution.caustic(world, t, u, v, side);
+        if depth >= DEEPEST || !self.solution.unresolved(t, u, v, side) {
+            return caustic + self.solution.irradiance(world, t, u, v, side);
+        }
+        let n = world.scene.mesh.geometric_normal(t) * side.sign();
+        let p = world.scene.mesh.interpolate(t, u, v, &world.scene.mesh.positions);
+        let ray = Ray::new(offset_origin(p, n), to_world(cosine_hemisphere(rng.vec2()), n));
+        let mut landings = Landings::default();
+        let followed = follow(world, ray, rng, |hit, side, weight| landings.push(hit, side, weight));
+        caustic + followed.direct + self.reflected(&landings, depth + 1, rng)
+    }
+}
+
+/// Where one ray landed: the surface and the share of its irradiance that comes back. Two sides of a translucent one.
+#[derive(Default)]
+struct Landings {
+    at: [Option<(Hit, Side, Rgb)>; 2],
+}
+
+impl Landings {
+    fn push(&mut self, hit: &Hit, side: Side, weight: Rgb) {
+        let free = if self.at[0].is_none() { 0 } else { 1 };
+        self.at[free] = Some((*hit, side, weight));
+    }
+}
+
+/// Estimates of one sensor so far.
+#[derive(Clone, Copy, Debug, Default)]
+struct Tally {
+    mean: Reading,
+    /// Of all that the rays find.
+    whole: Spread,
+    /// Without what photons may stand in for.
+    rest: Spread,
+    /// Rays that ran into an emitter by way of mirrors and glass.
+    found: u32,
 }
 
 /// Mean and spread of numbers as they come (Welford, Technometrics 4, 1962).

@@ -1,5 +1,7 @@
 //! Many readings in the terms of EN 12464-1: mean, extremes and uniformity.
 
+use super::Reading;
+
 /// What a set of illuminances (or luminances) is like.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Statistics {
@@ -37,6 +39,11 @@ impl Statistics {
         s.mean_error = square.sqrt() / n;
         s.noise = if s.mean > 0.0 { (square / n).sqrt() / s.mean } else { 0.0 };
         s
+    }
+
+    /// Of illuminances.
+    pub fn of_readings(readings: &[Reading]) -> Statistics {
+        Statistics::of(readings.iter().map(|r| (f64::from(r.illuminance()), f64::from(r.standard_error))))
     }
 
     /// Uniformity U₀, least over mean; 0 in the dark.

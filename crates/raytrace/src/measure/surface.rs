@@ -2,6 +2,7 @@
 
 use super::grid::{Grid, MOST, is_free};
 use super::{Reading, Sensor};
+use geometry::math::{offset_origin, to_world};
 use geometry::sampling::{self, Lattice2};
 use geometry::{Hit, Mesh, Ray, Rgb, Scene, Surface, Vec2, Vec3, World, photometry};
 use radiosity::Solution;
@@ -9,6 +10,8 @@ use radiosity::element::Side;
 
 /// Points at least on a surface that is not flat.
 const FEWEST: usize = 64;
+/// Rays that look whether a place sees anything.
+const LOOKS: u32 = 32;
 /// A side that gets less than this share of the light of the other is no lit one.
 const DARK: f32 = 1e-3;
 /// How far a flat surface may be from its plane, in units of its size.
@@ -70,15 +73,15 @@ pub fn sheets(
     spacing: f32,
     keep_all: bool,
 ) -> Vec<Sheet> {
-    let of = |side| sheet(world, triangles, side, spacing, keep_all);
+    let about = |p: &Place| {
+        let [u, v] = p.uv;
+        solution.irradiance(world, p.triangle, u, v, p.side)
+            + solution.direct(world, p.triangle, u, v, p.side)
+    };
+    let of = |side| sheet(world, triangles, side, spacing, keep_all, |p| !about(p).is_black());
     let sheets = [of(Side::Front), of(Side::Back)];
     let light = |sheet: &Sheet| {
         let places = || sheet.places.iter().flatten();
-        let about = |p: &Place| {
-            let [u, v] = p.uv;
-            solution.irradiance(world, p.triangle, u, v, p.side)
-                + solution.direct(world, p.triangle, u, v, p.side)
-        };
         places().map(|p| about(p).luminance()).sum::<f32>() / places().count().max(1) as f32
     };
     let light = [light(&sheets[0]), light(&sheets[1])];
@@ -88,14 +91,23 @@ pub fn sheets(
     sheets.into_iter().enumerate().filter(|(i, _)| is_lit(*i)).map(|(_, sheet)| sheet).collect()
 }
 
-fn sheet(world: &World, triangles: &[u32], side: Side, spacing: f32, keep_all: bool) -> Sheet {
+fn sheet(
+    world: &World,
+    triangles: &[u32],
+    side: Side,
+    spacing: f32,
+    keep_all: bool,
+    is_lit: impl Fn(&Place) -> bool,
+) -> Sheet {
     let mesh = &world.scene.mesh;
     let place = |(triangle, uv): (u32, [f32; 2])| {
         let normal = mesh.geometric_normal(triangle) * side.sign();
         let surface = seen(world, triangle, uv, normal);
         let on_surface = surface.bsdf.has_diffuse();
         let sensor = Sensor { position: surface.position, normal, on_surface };
-        Some(Place { sensor, triangle, uv, side }).filter(|p| keep_all || is_free(world, &p.sensor))
+        let place = Place { sensor, triangle, uv, side };
+        let in_room = || is_free(world, &sensor) && (sees_something(world, &sensor) || is_lit(&place));
+        (keep_all || in_room()).then_some(place)
     };
     match plane(mesh, triangles, side, spacing) {
         Some(grid) => {
@@ -107,6 +119,17 @@ fn sheet(world: &World, triangles: &[u32], side: Side, spacing: f32, keep_all: b
             Sheet { side, grid: None, places: places.collect() }
         }
     }
+}
+
+/// Whether anything is before a sensor: the outsides of a room see nothing.
+fn sees_something(world: &World, sensor: &Sensor) -> bool {
+    let pattern = Lattice2::new(LOOKS);
+    let from = offset_origin(sensor.position, sensor.normal);
+    world.scene.sky.is_some()
+        || (0..LOOKS).any(|i| {
+            let wi = to_world(sampling::cosine_hemisphere(pattern.point(i, Vec2::ZERO)), sensor.normal);
+            world.bvh.occluded(&Ray::new(from, wi))
+        })
 }
 
 /// Luminance (cd/m²) of a place along its normal: its own light, and what it reflects or lets through diffusely. `behind`
@@ -213,8 +236,15 @@ fn cells(mesh: &Mesh, triangles: &[u32], grid: &Grid) -> Vec<Option<(u32, [f32; 
     out
 }
 
-/// Points spread evenly over the area of `triangles`.
+/// About one point for `spacing`² m² of `triangles`.
 fn spread(mesh: &Mesh, triangles: &[u32], spacing: f32) -> Vec<(u32, [f32; 2])> {
+    let area: f64 = triangles.iter().map(|&t| f64::from(mesh.area(t))).sum();
+    let n = (area / f64::from(spacing).powi(2)) as usize;
+    even(mesh, triangles, n.clamp(FEWEST, MOST) as u32)
+}
+
+/// `n` points spread evenly over the area of `triangles`; none where these have none.
+pub(super) fn even(mesh: &Mesh, triangles: &[u32], n: u32) -> Vec<(u32, [f32; 2])> {
     let mut sums = Vec::with_capacity(triangles.len());
     let mut area = 0.0;
     for &t in triangles {
@@ -224,8 +254,7 @@ fn spread(mesh: &Mesh, triangles: &[u32], spacing: f32) -> Vec<(u32, [f32; 2])> 
     if area <= 0.0 {
         return Vec::new();
     }
-    let n = ((area / f64::from(spacing * spacing)) as usize).clamp(FEWEST, MOST);
-    let pattern = Lattice2::new(n as u32);
+    let pattern = Lattice2::new(n);
     let point = |i: u32| {
         let u = pattern.point(i, Vec2::splat(0.5 / pattern.len() as f32));
         let at = f64::from(u.x) * area;

@@ -48,7 +48,7 @@ pub fn run(args: MeasureArgs) -> Result<ExitCode> {
     for set in &sets {
         let sensors: Vec<_> = set.places.iter().map(|p| p.sensor).collect();
         let readings = meter.read_all(&sensors, first, &bars);
-        let Some(readings) = readings.into_iter().collect::<Option<Vec<_>>>() else {
+        let Some(readings) = readings else {
             bars.done();
             anyhow::bail!("stopped before all points were measured: nothing is written");
         };
@@ -111,7 +111,7 @@ fn with_luminance(world: &World, meter: &Meter, set: &Set, readings: Vec<Reading
     let sensor = |spot: &Spot| spot.on.as_ref().and_then(|place| surface::behind(world, place));
     let behind: Vec<Option<Sensor>> = set.places.iter().map(sensor).collect();
     let sensors: Vec<Sensor> = behind.iter().flatten().copied().collect();
-    let mut through = meter.read_all(&sensors, BEHIND + first, &()).into_iter().flatten();
+    let mut through = meter.read_all(&sensors, BEHIND + first, &()).unwrap_or_default().into_iter();
     let spots = set.places.iter().zip(behind).zip(readings);
     let taken = spots.map(|((spot, behind), reading)| {
         let through = behind.and_then(|_| through.next());

@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use geometry::{Scene, Vec3, World};
 use radiosity::Solution;
 use radiosity::element::Side;
-use raytrace::measure::grid::{Grid, has_floor, is_free};
+use raytrace::measure::grid::{Grid, floor_level, has_floor, has_room, is_free};
 use raytrace::measure::surface::{self, Place};
 use raytrace::measure::{Reading, Sensor};
 use std::path::Path;
@@ -72,28 +72,29 @@ pub fn in_the_air(world: &World, args: &MeasureArgs, listed: Option<Vec<[Vec3; 2
         ));
     }
     for &height in &args.workplane {
-        let grid = Grid::work_plane(world, height, args.spacing, args.margin)
+        let y = args.floor.unwrap_or_else(|| floor_level(world)) + height;
+        let whole = Grid::level(world, y, args.spacing)
             .map_err(|e| AskedWrongly(format!("--workplane {height}: {e}")))?;
-        let keep = |s: &Sensor| args.keep_all || (is_free(world, s) && has_floor(world, s));
-        sets.push(plane(world, format!("work plane {height} m"), "workplane", grid, keep));
+        let has_room = |s: &Sensor| args.margin == 0.0 || has_room(world, s, args.margin);
+        let keep = |s: &Sensor| args.keep_all || (is_free(world, s) && has_floor(world, s) && has_room(s));
+        let (grid, sensors) = whole.cropped(&whole.sensors(world, keep));
+        let name = match height == y {
+            true => format!("work plane {height} m"),
+            false => format!("work plane {height} m (y = {})", (100.0 * y).round() / 100.0),
+        };
+        sets.push(plane(name, "workplane", grid, sensors));
     }
     for (i, &[corner, across, up]) in args.plane.iter().enumerate() {
         let grid = Grid::new(corner, across, up, args.spacing)
             .map_err(|e| AskedWrongly(format!("--plane {}: {e}", i + 1)))?;
         let keep = |s: &Sensor| args.keep_all || is_free(world, s);
-        sets.push(plane(world, format!("plane {}", i + 1), "plane", grid, keep));
+        sets.push(plane(format!("plane {}", i + 1), "plane", grid, grid.sensors(world, keep)));
     }
     Ok(sets)
 }
 
-fn plane(
-    world: &World,
-    name: String,
-    kind: &'static str,
-    grid: Grid,
-    keep: impl Fn(&Sensor) -> bool + Sync,
-) -> Set {
-    let sensors = grid.sensors(world, keep).into_iter().enumerate();
+fn plane(name: String, kind: &'static str, grid: Grid, sensors: Vec<Option<Sensor>>) -> Set {
+    let sensors = sensors.into_iter().enumerate();
     let spots = sensors.map(|(cell, sensor)| Some(Spot { sensor: sensor?, cell, on: None }));
     Set::new(name, kind, Some(grid), spots.collect())
 }
