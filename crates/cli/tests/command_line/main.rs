@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 mod classical;
 mod compare;
+mod measure;
 mod render;
 mod sequence;
 mod solve;
@@ -51,6 +52,8 @@ fn help_teaches() {
         (&["render", "--help"], &["--error", "--camera", "--sky", "--preview", "Examples", "cd/m2"]),
         (&["solve", "--help"], &["--camera", "partial", "Examples"]),
         (&["inspect", "--help"], &["--json"]),
+        (&["measure", "--help"], &["--workplane", "--surface", "--false-colour", "Examples", "lx"]),
+        (&["false-colour", "--help"], &["--layer", "--isolines", "Examples"]),
         (&["compare", "--help"], &["--difference", "--max-error", "Examples"]),
     ] {
         let run = twolight(dir.path(), args);
@@ -94,6 +97,9 @@ fn wrong_arguments_exit_2() {
         &["render", "a.glb", "-o", "a.exr", "--light", "Lamp"],
         &["solve", "a.glb"],
         &["compare", "a.exr"],
+        &["measure", "a.glb", "--workplane", "high"],
+        &["measure", "a.glb", "--margin", "1", "--point", "0,0,0"],
+        &["false-colour", "a.exr"],
         &["inspect"],
     ] {
         let run = twolight(dir.path(), args);
