@@ -5,12 +5,14 @@ use crate::commands::print;
 use crate::job::AskedWrongly;
 use anyhow::Result;
 use raytrace::exr;
-use raytrace::false_colour::{Chart, Field};
+use raytrace::false_colour::{Chart, Field, number};
 use raytrace::output::check_writable;
 use std::process::ExitCode;
 
 /// Share of a picture's pixels that may be brighter than its scale: lamps, mostly.
 const LAMPS: f64 = 0.01;
+/// Contour lines are drawn of medians over so many pixels to each side.
+const SMOOTHING: usize = 4;
 
 /// Runs the command.
 pub fn run(args: &FalseColourCommand) -> Result<ExitCode> {
@@ -29,19 +31,21 @@ pub fn run(args: &FalseColourCommand) -> Result<ExitCode> {
         _ => ("Luminance", "cd/m\u{b2}"),
     };
     let field = Field::of_picture(&image);
-    let [mean, max] = [mean(&field), field.quantile(1.0)];
+    let high = field.quantile(1.0);
+    let [mean, max] = [mean(&field), high].map(number);
     let mut chart = chart(field, &args.colours, LAMPS);
+    chart.smoothing = SMOOTHING;
     let layer = args.layer.as_ref().filter(|l| *l != "luminance" && *l != "irradiance");
     chart.title = layer.map_or(what.to_string(), |layer| format!("{what}, {layer}"));
     chart.unit = unit.into();
-    let beyond = if max > chart.scale.high() { ", beyond the scale" } else { "" };
-    chart.caption = vec![format!("mean {mean:.4}   max {max:.4} {unit}{beyond}")];
+    let beyond = if high > chart.scale.high() { ", beyond the scale" } else { "" };
+    chart.caption = vec![format!("mean {mean}   max {max} {unit}{beyond}")];
     chart.write(&args.output)?;
     let ascii = unit.replace('\u{b2}', "2");
     print(&format!(
-        "{}: {what} up to {} {ascii} (mean {mean:.4}, max {max:.4})",
+        "{}: {what} up to {} {ascii} (mean {mean}, max {max})",
         args.output.display(),
-        chart.scale.high()
+        number(chart.scale.high())
     ))?;
     Ok(ExitCode::SUCCESS)
 }

@@ -31,6 +31,8 @@ pub struct Chart {
     pub unit: String,
     /// Values along which lines are drawn.
     pub isolines: Vec<f64>,
+    /// Lines are drawn of medians over so many pixels around each: 0 for a field without noise.
+    pub smoothing: usize,
     /// Lines below the picture.
     pub caption: Vec<String>,
     /// Pixels of a metre, for a ruler; `None` where the picture has no scale.
@@ -50,6 +52,7 @@ impl Chart {
             title: String::new(),
             unit: String::new(),
             isolines: Vec::new(),
+            smoothing: 0,
             caption: Vec::new(),
             pixels_per_metre: None,
         }
@@ -128,8 +131,11 @@ impl Chart {
     fn lines(&self, canvas: &mut Canvas, (left, top): (usize, usize)) {
         let mut taken = Vec::new();
         let mut labels = Vec::new();
+        let smooth =
+            (self.smoothing > 0 && !self.isolines.is_empty()).then(|| self.field.median(self.smoothing));
+        let field = smooth.as_ref().unwrap_or(&self.field);
         for &level in &self.isolines {
-            let covered = isolines::line(&self.field, level as f32);
+            let covered = isolines::line(field, level as f32);
             // White on dark colours, black on bright ones.
             let ink = self.ink(level);
             for (i, &share) in covered.iter().enumerate().filter(|(_, s)| **s > 0.0) {
@@ -137,7 +143,7 @@ impl Chart {
             }
             let text = number(level);
             let size = (Letters::Small.width(&text) + 6, Letters::Small.height());
-            if let Some(at) = isolines::label(&self.field, &covered, size, &taken) {
+            if let Some(at) = isolines::label(field, &covered, size, &taken) {
                 taken.push((at, size));
                 labels.push((at, size, text, level));
             }

@@ -1,6 +1,7 @@
 //! One value for each pixel of a picture.
 
 use crate::exr::Image;
+use rayon::prelude::*;
 
 /// Values, rows from the top; NaN where there is none.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,6 +58,26 @@ impl Field {
         Field { width: w, height: h, values }
     }
 
+    /// Medians over the square of `radius` pixels around each: without noise, yet with edges where they were.
+    pub fn median(&self, radius: usize) -> Field {
+        let one = |i: usize| {
+            let (x, y) = (i % self.width, i / self.width);
+            let (x1, y1) = ((x + radius).min(self.width - 1), (y + radius).min(self.height - 1));
+            let rows = y.saturating_sub(radius)..=y1;
+            let mut near: Vec<f32> = rows
+                .flat_map(|y| (x.saturating_sub(radius)..=x1).map(move |x| self.at(x, y)))
+                .filter(|v| !v.is_nan())
+                .collect();
+            let middle = near.len() / 2;
+            if near.is_empty() || self.at(x, y).is_nan() {
+                return f32::NAN;
+            }
+            *near.select_nth_unstable_by(middle, f32::total_cmp).1
+        };
+        let values = (0..self.values.len()).into_par_iter().map(one).collect();
+        Field { values, ..*self }
+    }
+
     /// The value at a pixel; NaN where there is none.
     pub fn at(&self, x: usize, y: usize) -> f32 {
         self.values[y * self.width + x]
@@ -76,6 +97,20 @@ impl Field {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn medians_take_noise_away_and_leave_edges() {
+        let edge = |x: usize| if x < 8 { 1.0 } else { 9.0 };
+        let mut values: Vec<f32> = (0..16 * 16).map(|i| edge(i % 16)).collect();
+        for (i, v) in values.iter_mut().enumerate().filter(|(i, _)| i % 7 == 3) {
+            *v = if i % 2 == 0 { 100.0 } else { f32::NAN };
+        }
+        let field = Field { width: 16, height: 16, values };
+        let median = field.median(2);
+        for (i, v) in median.values.iter().enumerate().filter(|(i, _)| !field.values[*i].is_nan()) {
+            assert!(*v == edge(i % 16), "{i}: {v}");
+        }
+    }
 
     #[test]
     fn a_ramp_stays_a_ramp_and_holes_stay_holes() {

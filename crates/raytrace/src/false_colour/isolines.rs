@@ -18,8 +18,9 @@ pub fn line(field: &Field, level: f32) -> Vec<f32> {
             let (y0, y1) = (y.saturating_sub(1), (y + 1).min(height - 1));
             let dx = slope(field.at(x0, y), field.at(x1, y), x1 - x0);
             let dy = slope(field.at(x, y0), field.at(x, y1), y1 - y0);
-            let distance = (v - level).abs() / dx.hypot(dy);
-            if distance.is_finite() {
+            let gradient = dx.hypot(dy);
+            let distance = (v - level).abs() / gradient;
+            if distance.is_finite() && gradient <= 0.2 * level {
                 out[y * width + x] = (1.15 - distance).clamp(0.0, 1.0);
             }
         }

@@ -9,4 +9,4 @@ mod scale;
 
 pub use chart::Chart;
 pub use field::Field;
-pub use scale::Scale;
+pub use scale::{Scale, number};

@@ -77,7 +77,7 @@ pub(super) fn end_above(most: f64) -> f64 {
 }
 
 /// Four digits at most, without a tail of zeros.
-pub(super) fn number(v: f64) -> String {
+pub fn number(v: f64) -> String {
     if v == 0.0 {
         return "0".into();
     }

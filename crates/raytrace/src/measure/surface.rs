@@ -7,9 +7,12 @@ use geometry::sampling::{self, Lattice2};
 use geometry::{Hit, Mesh, Ray, Rgb, Scene, Surface, Vec2, Vec3, World, photometry};
 use radiosity::Solution;
 use radiosity::element::Side;
+use radiosity::gather::{self, Origin};
 
 /// Points at least on a surface that is not flat.
 const FEWEST: usize = 64;
+/// Light samples that tell lit from dark.
+const LIGHT_SAMPLES: u32 = 16;
 /// Rays that look whether a place sees anything.
 const LOOKS: u32 = 32;
 /// A side that gets less than this share of the light of the other is no lit one.
@@ -73,10 +76,12 @@ pub fn sheets(
     spacing: f32,
     keep_all: bool,
 ) -> Vec<Sheet> {
+    // The solution knows no direct light where nothing reflects it.
     let about = |p: &Place| {
-        let [u, v] = p.uv;
-        solution.irradiance(world, p.triangle, u, v, p.side)
-            + solution.direct(world, p.triangle, u, v, p.side)
+        let ([u, v], Sensor { position, normal: ng, .. }) = (p.uv, p.sensor);
+        let direct =
+            gather::direct(world, &[Origin { position, ng }], ng, LIGHT_SAMPLES, 0, u64::from(p.triangle));
+        direct + solution.irradiance(world, p.triangle, u, v, p.side)
     };
     let of = |side| sheet(world, triangles, side, spacing, keep_all, |p| !about(p).is_black());
     let sheets = [of(Side::Front), of(Side::Back)];
