@@ -242,6 +242,9 @@ mod tests {
         for bad in ["", "Lamp", "=1", "Lamp=", "Lamp=-1", "Lamp=1,2", "Lamp=inf"] {
             assert!(light(bad).is_err(), "{bad}");
         }
+    }
+
+    #[test]
     fn points_and_rectangles_are_in_metres() {
         assert_eq!(vector("1, -2,.5"), Ok(Vec3::new(1.0, -2.0, 0.5)));
         assert!(vector("1,2").is_err() && vector("1,2,x").is_err() && vector("1,2,inf").is_err());

@@ -1,6 +1,6 @@
 //! `twolight measure`.
 
-use super::{FalseColourArgs, RunArgs, SkyArgs, WhichArgs};
+use super::{FalseColourArgs, LightArgs, RunArgs, WhichArgs};
 use crate::values;
 use clap::Args;
 use geometry::Vec3;
@@ -57,6 +57,9 @@ pub struct MeasureArgs {
     /// Noise to aim at, of each point, with 95 % confidence; sets rays, and mesh
     #[arg(long, value_name = "PERCENT", default_value = "1%", value_parser = values::share)]
     pub error: f32,
+    /// Take the light between surfaces from this file of `solve`
+    #[arg(long, value_name = "ROOM.twl")]
+    pub solution: Option<PathBuf>,
     /// Write every reading to this file
     #[arg(short, long, value_name = "LUX.csv")]
     pub output: Option<PathBuf>,
@@ -68,7 +71,7 @@ pub struct MeasureArgs {
     #[command(flatten)]
     pub which: WhichArgs,
     #[command(flatten)]
-    pub sky: SkyArgs,
+    pub light: LightArgs,
     #[command(flatten)]
     pub run: RunArgs,
 }

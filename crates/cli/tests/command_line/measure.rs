@@ -126,6 +126,25 @@ fn the_same_seed_gives_the_same_readings_on_any_number_of_threads() {
 }
 
 #[test]
+fn a_solution_serves_for_measuring() {
+    let dir = folder();
+    let box_scene = scene("cornell-box.gltf");
+    let file = box_scene.to_str().expect("UTF-8");
+    let solve = twolight(dir.path(), &["solve", file, "-o", "box.twl", "--error", "10%", "-q"]);
+    assert_eq!(solve.status, 0, "{}", solve.err);
+    let read = |more: &[&str]| {
+        let args = ["measure", file, "--point", "0.278,0.3,0.28", "--error", "3%", "--json", "-q"];
+        let reading =
+            parsed(&twolight(dir.path(), &[&args[..], more].concat()))["sets"][0]["readings"][0].clone();
+        ["illuminance", "indirect"].map(|name| reading[name].as_f64().expect("a number"))
+    };
+    let ([with, indirect], [without, _]) = (read(&["--solution", "box.twl"]), read(&[]));
+    assert!((with / without - 1.0).abs() < 0.04 && indirect > 0.1 * with, "{with} {without} {indirect}");
+    let run = twolight(dir.path(), &["measure", file, "--point", "0,0,0", "--solution", "no.twl"]);
+    assert!(run.status == 1 && run.err.contains("no.twl"), "{}", run.err);
+}
+
+#[test]
 fn what_is_asked_wrongly_is_said() {
     let dir = folder();
     lamp_over_floor(dir.path());

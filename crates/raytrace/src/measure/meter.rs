@@ -186,7 +186,8 @@ impl<'a> Meter<'a> {
             let wi = to_world(cosine_hemisphere(self.pattern.point(i, shift)), normal);
             let ray = Ray::new(offset_origin(position, normal), wi);
             let mut landings = Landings::default();
-            let followed = follow(self.world, ray, rng, |hit, side, weight| landings.push(hit, side, weight));
+            let followed =
+                follow(self.world, ray, rng, |hit, side, weight| landings.push(hit, side, weight), |_, _| ());
             out.indirect += (followed.direct + self.reflected(&landings, 0, rng)) * share;
             out.specular += followed.mirrored * share;
             found += u32::from(!followed.mirrored.is_black());
@@ -212,7 +213,8 @@ impl<'a> Meter<'a> {
         let p = world.scene.mesh.interpolate(t, u, v, &world.scene.mesh.positions);
         let ray = Ray::new(offset_origin(p, n), to_world(cosine_hemisphere(rng.vec2()), n));
         let mut landings = Landings::default();
-        let followed = follow(world, ray, rng, |hit, side, weight| landings.push(hit, side, weight));
+        let followed =
+            follow(world, ray, rng, |hit, side, weight| landings.push(hit, side, weight), |_, _| ());
         caustic + followed.direct + self.reflected(&landings, depth + 1, rng)
     }
 }

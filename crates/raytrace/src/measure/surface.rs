@@ -79,8 +79,8 @@ pub fn sheets(
     // The solution knows no direct light where nothing reflects it.
     let about = |p: &Place| {
         let ([u, v], Sensor { position, normal: ng, .. }) = (p.uv, p.sensor);
-        let direct =
-            gather::direct(world, &[Origin { position, ng }], ng, LIGHT_SAMPLES, 0, u64::from(p.triangle));
+        let (at, stream) = ([Origin { position, ng }], u64::from(p.triangle));
+        let direct = gather::direct(world, &at, ng, LIGHT_SAMPLES, 0, stream, |_, _| ());
         direct + solution.irradiance(world, p.triangle, u, v, p.side)
     };
     let of = |side| sheet(world, triangles, side, spacing, keep_all, |p| !about(p).is_black());

@@ -9,6 +9,7 @@ use crate::args::MeasureArgs;
 use crate::job::AskedWrongly;
 use crate::progress::Bars;
 use crate::room::{Room, start_threads};
+use crate::solutions;
 use anyhow::{Context, Result};
 use geometry::World;
 use radiosity::Solution;
@@ -29,13 +30,16 @@ pub fn run(args: MeasureArgs) -> Result<ExitCode> {
     let bars = Bars::new(args.run.quiet);
     start_threads(args.run.threads)?;
     bars.listen_for_interrupts();
-    let Room { world, warnings, .. } = Room::open(&args.scene, &args.which, &args.sky, &bars)?;
+    let Room { world, warnings, .. } = Room::open(&args.scene, &args.which, &args.light, &bars)?;
     sets::check_names(&world.scene, &args.surface)?;
 
     // Planes before light: whoever typed a wrong one need not wait for the solution.
     let mut sets = sets::in_the_air(&world, &args, listed)?;
-    let solution = prepass(&world, args.error, args.run.seed, &bars)
-        .with_context(|| format!("cannot solve {}", args.scene.display()))?;
+    let solution = match &args.solution {
+        Some(path) => solutions::read(path, &world)?.0,
+        None => prepass(&world, args.error, args.run.seed, &bars)
+            .with_context(|| format!("cannot solve {}", args.scene.display()))?,
+    };
     sets.extend(sets::on_surfaces(&world, &solution, &args)?);
     if sets.iter().all(|set| set.places.is_empty()) {
         anyhow::bail!("no point is left: all lie within objects or behind walls (--keep-all keeps them)");
