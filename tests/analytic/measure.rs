@@ -237,7 +237,7 @@ fn a_work_plane_ends_at_walls_and_furniture() {
         .block(Vec3::ZERO, Vec3::new(1.0, 2.0, 1.0), &wall)
         .block(Vec3::new(6.0, 0.0, 0.0), Vec3::new(7.0, 0.5, 3.0), &wall)
         .world();
-    assert!(floor_level(&world).abs() < 0.01);
+    assert!(floor_level(&world).abs() < 1e-5);
     let grid = Grid::level(&world, 0.85, 0.25).expect("the scene has a size");
     assert_eq!((grid.columns, grid.rows), (28, 12));
     let sensors = grid.sensors(&world, |s| is_free(&world, s) && has_floor(&world, s));

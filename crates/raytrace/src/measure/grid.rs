@@ -5,6 +5,7 @@ use geometry::math::to_world;
 use geometry::sampling::Lattice2;
 use geometry::{Ray, Vec2, Vec3, World};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// Rays that look around a point.
 const LOOKS: u32 = 64;
@@ -85,7 +86,8 @@ impl Grid {
 
     /// Unit; the rectangle is seen from where it points to.
     pub fn normal(&self) -> Vec3 {
-        self.across.cross(self.up).normalize_or_zero()
+        // In f64, or a level plane's normal is 0.999_999_94 long.
+        self.across.as_dvec3().cross(self.up.as_dvec3()).normalize_or_zero().as_vec3() + Vec3::ZERO
     }
 
     /// Number of cells.
@@ -171,15 +173,17 @@ pub fn floor_level(world: &World) -> f32 {
         let sensor = Sensor { position: p, normal: Vec3::Y, on_surface: false };
         let ray = Ray::new(lifted(world, &sensor), Vec3::Y);
         let hit = world.closest(&ray)?;
-        (hit.t > HEADROOM && shows_front(world, ray) == Some(true)).then_some((p.y / STEP).round() as i64)
+        (hit.t > HEADROOM && shows_front(world, ray) == Some(true)).then_some(p.y)
     };
-    let mut levels = std::collections::BTreeMap::new();
-    for level in places.into_iter().filter_map(height) {
-        *levels.entry(level).or_insert(0) += 1;
+    let mut levels: BTreeMap<i64, (u32, f32)> = BTreeMap::new();
+    for y in places.into_iter().filter_map(height) {
+        let (count, mean) = levels.entry((y / STEP).round() as i64).or_default();
+        *count += 1;
+        *mean += (y - *mean) / *count as f32;
     }
     // Of two storeys of one size the lower.
-    let most = levels.iter().max_by_key(|(level, count)| (**count, std::cmp::Reverse(**level)));
-    most.map_or(world.bounds.0.y, |(level, _)| *level as f32 * STEP)
+    let most = levels.iter().max_by_key(|(level, (count, _))| (*count, std::cmp::Reverse(**level)));
+    most.map_or(world.bounds.0.y, |(_, (_, mean))| *mean)
 }
 
 fn lifted(world: &World, sensor: &Sensor) -> Vec3 {
