@@ -1,11 +1,13 @@
 //! What was typed: a file for each subcommand, and here what several share.
 
+mod bake;
 mod compare;
 mod inspect;
 mod render;
 mod solve;
 mod views;
 
+pub use bake::BakeArgs;
 pub use compare::CompareArgs;
 pub use inspect::InspectArgs;
 pub use render::{DiffuseArg, IntegratorArg, RenderArgs, SolverArg};
@@ -41,6 +43,8 @@ pub enum Command {
     Render(Box<RenderArgs>),
     /// Solve a room's indirect light once, for any view of it, into a file
     Solve(SolveArgs),
+    /// Bake a scene's light into a .glb that any viewer shows
+    Bake(BakeArgs),
     /// Show what is in a scene, what lights it, and what is wrong with it
     Inspect(InspectArgs),
     /// Measure how far a picture is from a reference
