@@ -2,10 +2,11 @@
 // FOLDER holds index.html and the results.json it was made from. Needs playwright-core in a folder that NODE_PATH
 // names, and a Chromium: the variable CHROMIUM, or one that PATH finds. `cargo xtask check --browser` has all that.
 import assert from "node:assert/strict";
-import { accessSync, constants, readFileSync } from "node:fs";
+import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
-import { delimiter, join, resolve } from "node:path";
+import { join, resolve } from "node:path";
 import { pathToFileURL } from "node:url";
+import { findChromium } from "./chromium.mjs";
 
 // An import statement would not look into NODE_PATH; require does.
 const { chromium } = createRequire(import.meta.url)("playwright-core");
@@ -13,21 +14,6 @@ const { chromium } = createRequire(import.meta.url)("playwright-core");
 const folder = resolve(process.argv[2]);
 const address = pathToFileURL(join(folder, "index.html")).href;
 const results = JSON.parse(readFileSync(join(folder, "results.json"), "utf8"));
-
-function findChromium() {
-  const names = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
-  const places = (process.env.PATH ?? "").split(delimiter).flatMap((dir) => names.map((name) => join(dir, name)));
-  const found = (process.env.CHROMIUM ? [process.env.CHROMIUM] : places).find((path) => {
-    try {
-      accessSync(path, constants.X_OK);
-      return true;
-    } catch {
-      return false;
-    }
-  });
-  assert(found, "no Chromium: install Debian's `chromium`, or name one by the variable CHROMIUM");
-  return found;
-}
 
 const browser = await chromium.launch({ executablePath: findChromium() });
 

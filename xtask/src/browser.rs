@@ -1,9 +1,11 @@
-//! The page of `reference-comparison` in a browser: what no test of its text can tell.
+//! The page of `reference-comparison`, and baked scenes, in a browser: what no test of text and bytes can tell.
 //!
 //! Pictures are rendered small and on the spot, a page is made of them and of invented numbers, and
 //! `xtask/browser/report.mjs` uses it as a reader would, in a headless Chromium (Debian's `chromium`, or what the
-//! variable CHROMIUM names). Needs node and npm.
+//! variable CHROMIUM names). Rooms are baked and shown by three.js in the same browser (`xtask/browser/baked.mjs`), beside
+//! our own picture of them. Needs node and npm.
 
+mod baked;
 mod sample;
 
 use crate::comparison::report;
@@ -12,6 +14,8 @@ use std::process::Command;
 
 /// What drives the browser: the library alone, without browsers of its own.
 const DRIVER: &str = "playwright-core@1.65.1";
+/// What shows glTF on most web pages.
+const VIEWER: &str = "three@0.187.0";
 
 /// Makes the page and tries it; everything lands in `target/browser`.
 pub fn check() -> Result<()> {
@@ -24,9 +28,10 @@ pub fn check() -> Result<()> {
 
     let modules = folder.join("node_modules");
     let install = ["install", "--silent", "--no-audit", "--no-fund", "--no-save", "--prefix"];
-    run(Command::new("npm").args(install).arg(&folder).arg(DRIVER))?;
+    run(Command::new("npm").args(install).arg(&folder).args([DRIVER, VIEWER]))?;
     let script = root.join("xtask/browser/report.mjs");
-    run(Command::new("node").arg(script).arg(&folder).env("NODE_PATH", modules))
+    run(Command::new("node").arg(script).arg(&folder).env("NODE_PATH", &modules))?;
+    baked::check(&folder, &modules)
 }
 
 /// Runs it from the repository's root, its output beside ours.

@@ -65,7 +65,7 @@ pub fn run(without: &[String], browser: bool) -> Result<()> {
         println!("== {} took {:.0} s", step.name, start.elapsed().as_secs_f64());
     }
     if browser {
-        println!("\n== the page of reference-comparison, in a browser");
+        println!("\n== the page of reference-comparison, and baked rooms, in a browser");
         let start = Instant::now();
         crate::browser::check()?;
         println!("== browser took {:.0} s", start.elapsed().as_secs_f64());

@@ -27,6 +27,7 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Render(args) => commands::render::run(*args),
         Command::Solve(args) => commands::solve::run(&args),
+        Command::Bake(args) => commands::bake::run(args),
         Command::Inspect(args) => commands::inspect::run(&args),
         Command::Measure(args) => commands::measure::run(*args),
         Command::FalseColour(args) => commands::false_colour::run(&args),

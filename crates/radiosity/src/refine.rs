@@ -27,6 +27,10 @@ const ROUGH: f32 = 0.15;
 /// Times the variance of the noise that such a difference is to exceed: two standard deviations. With one, the gallery's
 /// pixels gathered for themselves wherever 80 rays a site happened to differ.
 const STANDS_OUT: f32 = 4.0;
+/// A face with fewer sites than this does not tell how much light there is around it.
+const FEW: u32 = 16;
+/// What is this much darker than the mean of all is dark, whoever looks.
+const DARK: f32 = 0.01;
 /// Elements (of h0² each) that the first mesh may have, about.
 const FIRST_ELEMENTS: f32 = 10_000.0;
 /// Rays that probe the middle of a leaf.
@@ -201,8 +205,9 @@ impl<'a> Refiner<'a> {
             self.gather(&tests.iter().map(|t| (t.vertex, t.sides)).collect::<Vec<_>>());
             self.settle();
             let values = self.field.spread(&self.e);
-            let floor = 0.1 * mean(&self.e).mean();
-            let errors: Vec<[f32; 2]> = tests.iter().map(|t| self.error(t, &values, floor)).collect();
+            let around =
+                self.levels(self.field.sites.iter().zip(&self.e).map(|(s, e)| (s.vertex, s.side, e.mean())));
+            let errors: Vec<[f32; 2]> = tests.iter().map(|t| self.error(t, &values, &around)).collect();
             rough.resize(self.elements.vertices.len(), false);
             let mut failed = vec![false; self.elements.vertices.len()];
             for (test, &[error, rough_error]) in tests.iter().zip(&errors) {
@@ -262,7 +267,8 @@ impl<'a> Refiner<'a> {
         // this side of the face. So a panel of which most corners lie dark behind a frame is looked at too.
         const HIDDEN: f32 = 0.1;
         let values = self.field.spread(&self.e);
-        let floor = 0.1 * mean(&self.e).mean();
+        let around =
+            self.levels(self.field.sites.iter().zip(&self.e).map(|(s, e)| (s.vertex, s.side, e.mean())));
         let elsewhere = self.means_of_faces();
         let promise = |difference: f32, level: f32, slot: usize| match level + elsewhere[self.face_slot(slot)]
         {
@@ -274,7 +280,7 @@ impl<'a> Refiner<'a> {
                     0.0
                 }
             }
-            around => (difference + HIDDEN * around) / (level + floor),
+            near => (difference + HIDDEN * near) / (level + 0.1 * around[self.face_slot(slot)]),
         };
         let change = |a: VertexId, b: VertexId| {
             let face = self.elements.vertices[a as usize].face;
@@ -324,6 +330,21 @@ impl<'a> Refiner<'a> {
         )
     }
 
+    /// How much light there is on each side of each face, lx, for telling what is dark there: the mean over its sites, or over
+    /// all of them where it has few. A dim room beside a bright one is looked at by eyes and cameras that are used to it.
+    pub(crate) fn levels(&self, sites: impl Iterator<Item = (VertexId, Side, f32)>) -> Vec<f32> {
+        let mut sums = vec![(0.0, 0u32); 2 * self.elements.faces as usize];
+        let (mut all, mut count) = (0f64, 0u32);
+        for (vertex, side, e) in sites {
+            let sum = &mut sums[self.face_slot(slot(vertex, side))];
+            *sum = (sum.0 + e, sum.1 + 1);
+            (all, count) = (all + f64::from(e), count + 1);
+        }
+        let all = (all / f64::from(count.max(1))) as f32;
+        let level = |(sum, n): (f32, u32)| if n >= FEW { (sum / n as f32).max(DARK * all) } else { all };
+        sums.into_iter().map(level).collect()
+    }
+
     /// Mean E of each side of each face, lx, over its sites.
     fn means_of_faces(&self) -> Vec<f32> {
         let mut sums = vec![(0.0, 0u32); 2 * self.elements.faces as usize];
@@ -335,13 +356,13 @@ impl<'a> Refiner<'a> {
     }
 
     /// Number of the side of a face that a slot lies on.
-    fn face_slot(&self, slot: usize) -> usize {
+    pub(crate) fn face_slot(&self, slot: usize) -> usize {
         2 * self.elements.vertices[slot / 2].face as usize + slot % 2
     }
 
     /// Relative difference of what was gathered from what was predicted, the worse side: by what it matters, and as such
     /// where it stands out of the rays' noise (the two of [`ROUGH`]).
-    fn error(&self, test: &Test, values: &[Rgb], floor: f32) -> [f32; 2] {
+    fn error(&self, test: &Test, values: &[Rgb], around: &[f32]) -> [f32; 2] {
         Side::BOTH
             .iter()
             .filter(|side| test.sides[side.index()] && self.field.usable(slot(test.vertex, **side)))
@@ -360,6 +381,7 @@ impl<'a> Refiner<'a> {
                 let difference = (got - predicted).map(f32::abs).mean();
                 // What the rays' own noise explains is no bend of the light.
                 let noise = known_variance / (weight * weight) + self.field.variance(slot(test.vertex, side));
+                let floor = 0.1 * around[self.face_slot(slot(test.vertex, side))];
                 let level = (0.5 * (got + predicted).mean() + floor).max(1e-30);
                 let beyond = |noise: f32| (difference * difference - noise).max(0.0).sqrt() / level;
                 [self.weight(slot(test.vertex, side)) * beyond(noise), beyond(STANDS_OUT * noise)]

@@ -3,7 +3,7 @@
 use crate::element::{Side, VertexId, slot};
 use crate::field::Site;
 use crate::gather::{self, Origin};
-use crate::refine::{INWARD, Refiner, mean};
+use crate::refine::{INWARD, Refiner};
 use crate::solve::lock;
 use crate::transport::Row;
 use geometry::sampling::Lattice2;
@@ -33,12 +33,14 @@ impl Refiner<'_> {
         // Where few rays find the light (a sunny patch, a lamp behind a shade) it takes more of them.
         for _ in 0..2 {
             rays *= 4;
-            let all = self.field.sites.iter().map(|s| &s.row).chain(&rows).map(|r| r.direct);
-            let floor = 0.1 * mean(&all.collect::<Vec<_>>()).mean();
+            let before = self.field.sites.iter().map(|s| (s.vertex, s.side, s.row.direct.mean()));
+            let new = jobs.iter().zip(&rows).map(|(&(v, side), row)| (v, side, row.direct.mean()));
+            let around = self.levels(before.chain(new));
             let noisy = |i: &usize| {
                 let (row, (v, side)) = (&rows[*i], jobs[*i]);
-                self.weight(slot(v, side)) * row.variance.sqrt()
-                    > self.config.noise * (row.direct.mean() + floor)
+                let s = slot(v, side);
+                self.weight(s) * row.variance.sqrt()
+                    > self.config.noise * (row.direct.mean() + 0.1 * around[self.face_slot(s)])
             };
             let which: Vec<usize> = (0..rows.len()).filter(noisy).collect();
             if which.is_empty() || self.progress.stopped() {

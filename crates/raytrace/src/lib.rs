@@ -30,6 +30,7 @@
 //! ```
 
 mod adaptive;
+pub mod bake;
 pub mod by_light;
 pub mod difference;
 pub mod direct;

@@ -82,6 +82,8 @@ const MESH_SHARE: f32 = 0.85;
 pub(crate) const MOST_SAMPLES: u32 = 16_384;
 /// Times at most that a picture which missed the error asked is made better.
 const MOST_REPAIRS: u32 = 2;
+/// No repair asks for less of the error than this share.
+const SMALLEST_STEP: f32 = 0.5;
 /// An error is missed by so much more than it seems, for the next step is not known exactly.
 const MARGIN: f32 = 0.8;
 /// Rays for the probes at most: so many, and this share of what both passes took.
@@ -240,6 +242,8 @@ fn two_passes(
     let fixed = settings.classical.is_some() || settings.samples.is_some() || settings.gather_rays.is_some();
     let most_repairs = if fixed { 0 } else { MOST_REPAIRS };
     let (mut probes, mut repairs) = (None, 0);
+    // The best whole picture so far: a repair that is cut off is no better.
+    let mut whole: Option<Outcome> = None;
     loop {
         let solution = made.as_ref().or(solution).expect("given or made");
         let rays = ((256.0 * (0.02 / mesh_error)) as u32).clamp(64, 1024);
@@ -261,23 +265,8 @@ fn two_passes(
                 verdict = probes.as_ref().map(|probes| probes.judge(&film, settings.error));
                 clock.lap("verify");
             }
-            // A classical method is shown as it is: what was asked of it are its patches.
-            if let Some(verdict) = verdict.filter(|v| v.judgement() == Judgement::Missed)
-                && repairs < most_repairs
-                && watch.has_time_for(clock.total())
-            {
-                repairs += 1;
-                let step = MARGIN * (verdict.asked / verdict.error) as f32;
-                // Whichever is the larger part of the error becomes smaller by what is missing.
-                if f64::from(noise).powi(2) > 0.5 * verdict.error.powi(2) {
-                    noise_error *= step;
-                    continue;
-                }
-                mesh_error *= step;
-                break mesh_error;
-            }
             let mut report = Report {
-                stages: clock.stages,
+                stages: Vec::new(),
                 texts: facts(&solution.report),
                 radiosity: Some(solution.report.clone()),
                 verdict,
@@ -287,7 +276,26 @@ fn two_passes(
                 report.texts.push(("error measured".into(), verdict.to_string()));
             }
             report.texts.push(("noise".into(), format!("{:.2} % estimated", 100.0 * noise)));
-            return Ok(Outcome { film, by_light: Vec::new(), finished, report });
+            let outcome = Outcome { film, by_light: Vec::new(), finished, report };
+            if let Some(verdict) = verdict.filter(|v| v.judgement() == Judgement::Missed)
+                && repairs < most_repairs
+                && watch.has_time_for(clock.total())
+            {
+                repairs += 1;
+                whole = Some(outcome);
+                // Half of the error costs about five times as much: no more than that at once.
+                let step = (MARGIN * (verdict.asked / verdict.error) as f32).max(SMALLEST_STEP);
+                // Whichever is the larger part of the error becomes smaller by what is missing.
+                if f64::from(noise).powi(2) > 0.5 * verdict.error.powi(2) {
+                    noise_error *= step;
+                    continue;
+                }
+                mesh_error *= step;
+                break mesh_error;
+            }
+            let mut outcome = if finished { outcome } else { whole.unwrap_or(outcome) };
+            outcome.report.stages = clock.stages;
+            return Ok(outcome);
         };
         let finer = Settings { error: finer_mesh, ..settings.clone() };
         made = Some(prepass_for(world, cameras, &finer, watch.progress)?);

@@ -1,5 +1,6 @@
 //! What was typed: a file for each subcommand, and here what several share.
 
+mod bake;
 mod compare;
 mod false_colour;
 mod inspect;
@@ -8,6 +9,7 @@ mod render;
 mod solve;
 mod views;
 
+pub use bake::BakeArgs;
 pub use compare::CompareArgs;
 pub use false_colour::{FalseColourArgs, FalseColourCommand, ScaleArg};
 pub use inspect::InspectArgs;
@@ -45,6 +47,8 @@ pub enum Command {
     Render(Box<RenderArgs>),
     /// Solve a room's indirect light once, for any view of it, into a file
     Solve(SolveArgs),
+    /// Bake a scene's light into a .glb that any viewer shows
+    Bake(BakeArgs),
     /// Show what is in a scene, what lights it, and what is wrong with it
     Inspect(InspectArgs),
     /// Measure illuminance in a scene, in lx: at points, on planes and on surfaces

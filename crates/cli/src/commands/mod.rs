@@ -1,5 +1,6 @@
 //! One file for each subcommand.
 
+pub mod bake;
 pub mod compare;
 pub mod false_colour;
 pub mod inspect;

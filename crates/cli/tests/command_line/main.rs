@@ -4,6 +4,7 @@ use assert_cmd::Command;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+mod bake;
 mod classical;
 mod compare;
 mod measure;
@@ -48,9 +49,10 @@ fn scene(name: &str) -> PathBuf {
 fn help_teaches() {
     let dir = folder();
     for (args, words) in [
-        (&["--help"][..], &["render", "inspect", "compare", "Exit status"][..]),
+        (&["--help"][..], &["render", "bake", "inspect", "compare", "Exit status"][..]),
         (&["render", "--help"], &["--error", "--camera", "--sky", "--preview", "Examples", "cd/m2"]),
         (&["solve", "--help"], &["--camera", "partial", "Examples"]),
+        (&["bake", "--help"], &["--lightmap", "--exposure", "Examples", "KHR_materials_unlit"]),
         (&["inspect", "--help"], &["--json"]),
         (&["measure", "--help"], &["--workplane", "--surface", "--false-colour", "Examples", "lx"]),
         (&["false-colour", "--help"], &["--layer", "--isolines", "Examples"]),

@@ -29,6 +29,7 @@ mod topology;
 mod uri;
 mod variants;
 mod warnings;
+pub mod write;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;

@@ -16,6 +16,11 @@ pub fn coverage_at(scene: &Scene, hit: &Hit) -> f32 {
     }
 }
 
+/// Base colour, linear, [0, 1], and alpha: factor, texture and vertex colour.
+pub fn base_color_at(scene: &Scene, hit: &Hit) -> (Rgb, f32) {
+    Point::new(scene, hit.triangle, hit.u, hit.v).base_color()
+}
+
 /// Emitted radiance, cd/m², toward the front or the back; not weighted by coverage. Black for an unlit material.
 pub fn emission_at(scene: &Scene, hit: &Hit, front: bool) -> Rgb {
     Point::new(scene, hit.triangle, hit.u, hit.v).emission(front)

@@ -7,7 +7,7 @@ mod normals;
 #[cfg(test)]
 mod tests;
 
-pub use lookup::{coverage_at, emission_at, straight_through};
+pub use lookup::{base_color_at, coverage_at, emission_at, straight_through};
 
 use crate::bsdf::{Bsdf, Shading};
 use crate::math::Vec3;

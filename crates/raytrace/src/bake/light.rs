@@ -1,0 +1,160 @@
+//! The light at a point of a surface, whoever looks at it.
+
+use super::Light;
+use crate::integrator::hybrid::{Hybrid, Photons, Quality};
+use crate::render::DiffuseMode;
+use geometry::bsdf::{Bsdf, Shading};
+use geometry::math::offset_origin;
+use geometry::photometry::reflected_radiance;
+use geometry::sampling::{Lattice2, Rng};
+use geometry::surface::base_color_at;
+use geometry::{Hit, Ray, Rgb, Surface, World};
+use radiosity::Solution;
+use radiosity::element::Side;
+
+/// A place on one side of a scene triangle.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// Scene triangle.
+    pub triangle: u32,
+    /// Barycentrics of its second and third corner.
+    pub uv: [f32; 2],
+    /// Which side.
+    pub side: Side,
+}
+
+/// What comes from there.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Seen {
+    /// What a white matt surface would send back, E/π, cd/m².
+    pub white: Rgb,
+    /// The surface's own radiance, cd/m².
+    pub emission: Rgb,
+    /// Base colour, [0, 1].
+    pub base: Rgb,
+    /// Alpha, [0, 1].
+    pub alpha: f32,
+    /// Whether hardly an eye can get there: something lies close above, or around it.
+    pub hidden: bool,
+    /// Variance of the luminance of `white`: right in the mean of many places, not for one.
+    pub variance: f32,
+}
+
+impl Seen {
+    /// The radiance of the surface taken for matt: what it reflects, and its own, cd/m².
+    pub fn radiance(&self) -> Rgb {
+        self.base * self.white + self.emission
+    }
+}
+
+/// Looks light up: direct light by shadow rays, the rest from the solution, or gathered where it has none.
+#[derive(Clone, Debug)]
+pub struct Lamp<'a> {
+    by_vertices: Hybrid<'a>,
+    by_rays: Hybrid<'a>,
+    shadow: u32,
+}
+
+impl<'a> Lamp<'a> {
+    /// - `shadow`: shadow rays of each look.
+    pub fn new(world: &'a World, solution: &'a Solution, shadow: u32) -> Lamp<'a> {
+        let by_vertices =
+            Hybrid { world, solution, mode: DiffuseMode::Split, pattern: Lattice2::new(GATHER_RAYS) };
+        let by_rays = Hybrid { mode: DiffuseMode::Gather, ..by_vertices.clone() };
+        Lamp { by_vertices, by_rays, shadow }
+    }
+
+    /// What is seen at `place` from straight above it, by two looks, whose difference tells the noise.
+    ///
+    /// With A and B the looks and m their mean, (x − m)² less the variance stated is (x − A)(x − B): what x is off, free
+    /// of the noise that the looks do not share.
+    pub fn seen(&self, place: Place, rng: &mut Rng) -> Seen {
+        let (a, b) = (self.look(place, rng), self.look(place, rng));
+        let half = 0.5 * (a.white - b.white).luminance();
+        Seen { white: (a.white + b.white) * 0.5, variance: half * half, ..a }
+    }
+
+    /// The same by one look, whose noise is not known.
+    pub fn look(&self, place: Place, rng: &mut Rng) -> Seen {
+        let world = self.by_vertices.world;
+        let surface = surface_at(world, place);
+        let (base, alpha) = base_color_at(&world.scene, &hit(place));
+        let emission = surface.emission;
+        let wo = surface.ng;
+        // The solution has values only where light is reflected diffusely.
+        let known = world.scene.materials[surface.material.0 as usize].may_be_diffuse();
+        let hybrid = if known { &self.by_vertices } else { &self.by_rays };
+        let quality = Quality { shadow: self.shadow, gather: true, photons: Photons::Always };
+        let translucent = surface.bsdf.is_translucent();
+        let matt = match translucent {
+            true => surface,
+            false => {
+                let bsdf = Bsdf::new(&Shading::LAMBERT, surface.ns, surface.ng, surface.front);
+                Surface { bsdf, unlit: None, ..surface }
+            }
+        };
+        let phase = rng.below(16);
+        let (shown, _) = hybrid.diffuse(&matt, wo, quality, phase, &[matt.position], rng);
+        let mut white = shown.direct + shown.indirect;
+        if translucent {
+            // What comes through from behind, as if it had come from the front.
+            let per = |l: f32, base: f32| l / base.max(0.02);
+            white = Rgb::new(per(white.r, base.r), per(white.g, base.g), per(white.b, base.b));
+        }
+        let hidden = self.is_hidden(&matt, white);
+        let seen = Seen { white, emission, base, alpha, hidden, variance: 0.0 };
+        if white.is_finite() { seen } else { Seen { white: Rgb::BLACK, ..seen } }
+    }
+
+    /// Whether the ray straight up from `surface` ends close by, or in the dark on something's inside.
+    fn is_hidden(&self, surface: &Surface, white: Rgb) -> bool {
+        let world = self.by_vertices.world;
+        let ray = Ray::new(offset_origin(surface.position, surface.ng), surface.ng);
+        let Some(hit) = world.closest(&ray) else { return false };
+        let inside = world.scene.mesh.geometric_normal(hit.triangle).dot(ray.direction) > 0.0;
+        let usual = reflected_radiance(Rgb::WHITE, self.by_vertices.solution.report.mean);
+        hit.t < CLOSE * world.scale || (inside && white.luminance() < DARK * usual.luminance())
+    }
+}
+
+/// Closer than this nobody looks in, in units of the rooms' size: 2 cm in a room of 5 m.
+const CLOSE: f32 = 0.004;
+/// Darker than this share of the usual indirect light is the inside of things.
+const DARK: f32 = 0.1;
+
+/// Rays of a gather in one look: many looks make up a vertex or a texel's neighbourhood.
+const GATHER_RAYS: u32 = 16;
+
+/// The surface at `place`, looked at along its normal.
+fn surface_at(world: &World, place: Place) -> Surface {
+    let Place { triangle, uv: [u, v], side } = place;
+    let mesh = &world.scene.mesh;
+    let n = mesh.geometric_normal(triangle) * side.sign();
+    let p = mesh.interpolate(triangle, u, v, &mesh.positions);
+    Surface::new(&world.scene, &Ray::new(p + n, -n), &hit(place))
+}
+
+fn hit(Place { triangle, uv: [u, v], .. }: Place) -> Hit {
+    Hit { t: 1.0, triangle, u, v }
+}
+
+/// The same by the solution's vertices alone: coarse, and without a ray.
+pub fn roughly(world: &World, solution: &Solution, place: Place) -> Seen {
+    let Place { triangle, uv: [u, v], side } = place;
+    let (base, alpha) = base_color_at(&world.scene, &hit(place));
+    let e = solution.irradiance(world, triangle, u, v, side)
+        + solution.direct(world, triangle, u, v, side)
+        + solution.caustic(world, triangle, u, v, side);
+    let white = reflected_radiance(Rgb::WHITE, e);
+    let emission = surface_at(world, place).emission;
+    Seen { white, emission, base, alpha, hidden: false, variance: 0.0 }
+}
+
+/// The world for the light that is wanted, where it is another than all of it.
+pub fn without_lamps(world: &World, light: Light) -> Option<World> {
+    (light == Light::Indirect && !world.scene.lights.is_empty()).then(|| {
+        let mut scene = world.scene.clone();
+        scene.lights.clear();
+        World::new(scene)
+    })
+}
