@@ -7,6 +7,7 @@ mod browser;
 mod check;
 mod comparison;
 mod fuzz;
+mod guide;
 #[cfg(test)]
 mod ourselves;
 mod peers;
@@ -41,6 +42,8 @@ enum Chore {
     },
     /// Spoil sound glTF files at random and load them: no panic, no hang, no hunger for memory
     Fuzz(fuzz::Args),
+    /// Run every command of assets/guide.md, and make its pictures
+    Guide,
     /// Compare speed and error with references and other renderers
     ReferenceComparison(comparison::Args),
     /// Run a program and write down its time and memory: for `reference-comparison`
@@ -81,6 +84,7 @@ fn main() -> Result<()> {
         Chore::Bench(Bench::Rays(args)) => bench_rays::run(args),
         Chore::Check { without, browser } => check::run(&without, browser),
         Chore::ReferenceComparison(args) => comparison::run(args),
+        Chore::Guide => guide::run(),
         Chore::Fuzz(args) => fuzz::run(args),
         Chore::Measured(args) => comparison::measured(args),
         Chore::Peers { what: None } => peers::list(),

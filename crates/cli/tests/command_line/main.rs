@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 mod bake;
 mod classical;
 mod compare;
+mod kill;
 mod measure;
 mod render;
 mod sequence;
