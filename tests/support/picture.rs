@@ -18,6 +18,7 @@ pub fn hybrid(width: u32, height: u32, error: f32) -> Settings {
         gather_rays: None,
         samples: None,
         verify: false,
+        keep_solution: false,
         by_light: false,
     }
 }

@@ -1,9 +1,12 @@
 //! The guide, held to its word: every command of `assets/guide.md` is run, and makes the guide's pictures.
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use std::fs;
-use std::path::Path;
 use std::process::Command;
+use std::time::Instant;
+
+/// Commands that say how far they are, unless told not to.
+const WORK: [&str; 4] = ["render", "solve", "measure", "bake"];
 
 /// Runs the commands in `target/guide`, and puts the pictures that the guide shows into `assets/pictures`.
 pub fn run() -> Result<()> {
@@ -17,13 +20,15 @@ pub fn run() -> Result<()> {
     fs::copy(root.join("assets/gallery.glb"), dir.join("room.glb"))?;
     for command in commands(&text) {
         println!("$ {}", command.join(" "));
+        let start = Instant::now();
         let status = Command::new(root.join("target/release/twolight"))
             .args(&command[1..])
-            .args((command[1] != "inspect").then_some("--quiet"))
+            .args(WORK.contains(&&*command[1]).then_some("--quiet"))
             .current_dir(&dir)
             .status()?;
         // A rough picture may be found to be rougher than asked.
         ensure!(matches!(status.code(), Some(0 | 3)), "`{}` failed", command.join(" "));
+        println!("  ({:.1} s)", start.elapsed().as_secs_f64());
     }
     for name in pictures(&text) {
         let from = dir.join(name.strip_prefix("guide-").context("a picture of the guide is called guide-")?);
@@ -72,9 +77,7 @@ mod tests {
         );
         for name in pictures(&text) {
             let path = crate::root().join("assets/pictures").join(&name);
-            if !Path::new(&path).is_file() {
-                bail!("{name} is missing: cargo xtask guide");
-            }
+            ensure!(path.is_file(), "{name} is missing: cargo xtask guide");
         }
         Ok(())
     }

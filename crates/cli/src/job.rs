@@ -255,6 +255,7 @@ impl RenderJob {
             gather_rays: self.gather_rays,
             samples: self.samples,
             verify: self.verify,
+            keep_solution: self.solution.is_some(),
             by_light: self.light_layers,
         })
     }

@@ -21,6 +21,7 @@
 //!     gather_rays: None,
 //!     samples: None,
 //!     verify: true,
+//!     keep_solution: false,
 //!     by_light: false,
 //! };
 //! // Without a solution it makes its own; for many views, pass that of `prepass`.

@@ -70,6 +70,8 @@ pub struct Settings {
     pub samples: Option<u32>,
     /// Whether to measure the picture's error by probes, and to go on where it is missed.
     pub verify: bool,
+    /// Whether the solution stays as it is, whatever the probes find: it serves other pictures too.
+    pub keep_solution: bool,
     /// Whether the prepass keeps the light of each group of lamps apart.
     pub by_light: bool,
 }
@@ -276,17 +278,20 @@ fn two_passes(
                 report.texts.push(("error measured".into(), verdict.to_string()));
             }
             report.texts.push(("noise".into(), format!("{:.2} % estimated", 100.0 * noise)));
+            // Whether samples make up the larger part of the error.
+            let noisy = |verdict: Verdict| f64::from(noise).powi(2) > 0.5 * verdict.error.powi(2);
             let outcome = Outcome { film, by_light: Vec::new(), finished, report };
             if let Some(verdict) = verdict.filter(|v| v.judgement() == Judgement::Missed)
                 && repairs < most_repairs
                 && watch.has_time_for(clock.total())
+                && (!settings.keep_solution || noisy(verdict))
             {
                 repairs += 1;
                 whole = Some(outcome);
                 // Half of the error costs about five times as much: no more than that at once.
                 let step = (MARGIN * (verdict.asked / verdict.error) as f32).max(SMALLEST_STEP);
                 // Whichever is the larger part of the error becomes smaller by what is missing.
-                if f64::from(noise).powi(2) > 0.5 * verdict.error.powi(2) {
+                if noisy(verdict) {
                     noise_error *= step;
                     continue;
                 }

@@ -51,7 +51,8 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
         }
         if picture.missed() {
             missed = true;
-            bars.note(&format!("warning: {} is not as exact as asked", picture.output.display()));
+            let why = if job.solution.is_some() { ": the solution is too rough for this view" } else { "" };
+            bars.note(&format!("warning: {} is not as exact as asked{why}", picture.output.display()));
         }
         if !job.json {
             print(&if shot.frame.is_some() { picture.short_line() } else { picture.line() })?;

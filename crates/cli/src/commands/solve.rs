@@ -48,6 +48,7 @@ pub fn run(args: &SolveArgs) -> Result<ExitCode> {
         gather_rays: None,
         samples: None,
         verify: false,
+        keep_solution: false,
         by_light: true,
     };
     let mut clock = Instant::now();

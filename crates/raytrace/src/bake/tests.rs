@@ -77,6 +77,7 @@ fn a_baked_room_looks_as_the_room_does() {
         gather_rays: None,
         samples: None,
         verify: false,
+        keep_solution: false,
         by_light: false,
     };
     let film = render(&room.world, &room.cameras[0], Some(&room.solution), &picture, &()).unwrap().film;
