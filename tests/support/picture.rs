@@ -2,25 +2,11 @@
 
 use geometry::{Camera, Rgb, World};
 use radiosity::Solution;
-use raytrace::{DiffuseMode, Film, Integrator, Settings, prepass, render};
+use raytrace::{Film, Integrator, Settings, prepass, render};
 
 /// The two passes at `error` (0.02 is 2 %), `width` × `height`, indirect light from the vertices.
 pub fn hybrid(width: u32, height: u32, error: f32) -> Settings {
-    Settings {
-        width,
-        height,
-        seed: 0,
-        error,
-        integrator: Integrator::Hybrid,
-        diffuse: DiffuseMode::Split,
-        classical: None,
-        deadline: None,
-        gather_rays: None,
-        samples: None,
-        verify: false,
-        keep_solution: false,
-        by_light: false,
-    }
+    Settings { width, height, seed: 0, error, verify: false, ..Settings::default() }
 }
 
 /// The reference, `spp` paths through each pixel.

@@ -1,6 +1,6 @@
 //! Which of a scene's cameras are meant.
 
-use crate::job::AskedWrongly;
+use crate::job::{AskedWrongly, fit_for_file};
 use anyhow::Result;
 use geometry::{Camera, Scene};
 
@@ -56,7 +56,7 @@ fn named_apart(cameras: &[Camera]) -> Vec<Camera> {
         if camera.name.is_empty() {
             camera.name = i.to_string();
         }
-        while !seen.insert(camera.name.to_lowercase()) {
+        while !seen.insert(fit_for_file(&camera.name).to_lowercase()) {
             camera.name = format!("{}-{i}", camera.name);
         }
         camera
@@ -87,6 +87,7 @@ mod tests {
         assert_eq!(chosen(Some("1"), &names), ["Kitchen"]);
         assert_eq!(chosen(Some("0"), &names), ["0"]);
         assert_eq!(chosen(Some("all"), &["a", "A", "", "a"]), ["a", "A-1", "2", "a-3"]);
+        assert_eq!(chosen(Some("all"), &["A/B", "A:B"]), ["A/B", "A:B-1"]);
         assert_eq!(chosen(None, &[]), ["framing"]);
     }
 

@@ -205,9 +205,19 @@ impl RenderJob {
         WhichArgs { time: time.or(self.which.time), ..self.which.clone() }
     }
 
+    /// Whether a picture is to be left out, for it was finished before, with the preview that belongs to it.
+    pub fn is_there(&self, output: &Path, preview: Option<&Path>) -> bool {
+        self.skip_existing && exr::is_finished(output) && preview.is_none_or(Path::is_file)
+    }
+
     /// Numbers of the frames that are not there yet; `None` where each camera has one picture.
     pub fn frames(&self) -> Option<Vec<u32>> {
-        let there = |frame: &u32| self.skip_existing && exr::is_finished(&numbered(&self.output, *frame));
+        let there = |&frame: &u32| {
+            self.is_there(
+                &numbered(&self.output, frame),
+                self.preview.as_ref().map(|p| numbered(p, frame)).as_deref(),
+            )
+        };
         self.views.frames().map(|frames| frames.filter(|frame| !there(frame)).collect())
     }
 
@@ -251,11 +261,11 @@ impl RenderJob {
             integrator: self.integrator,
             diffuse: self.diffuse,
             classical: self.classical.clone(),
-            deadline: self.time_limit.map(|limit| Instant::now() + limit),
+            deadline: self.time_limit.and_then(|limit| Instant::now().checked_add(limit)),
             gather_rays: self.gather_rays,
             samples: self.samples,
             verify: self.verify,
-            keep_solution: self.solution.is_some(),
+            keep_solution: self.solution.is_some() || self.views.frames().is_some(),
             by_light: self.light_layers,
         })
     }
@@ -285,11 +295,16 @@ fn check_size(w: u32, h: u32) -> Result<()> {
 /// `path` with `name` before its extension, for the picture of one of several cameras: out.exr, Hall: out.Hall.exr.
 /// Characters that a file name cannot have on some system become `_`.
 pub fn with_name(path: &Path, name: &str) -> PathBuf {
-    let unfit = |c: char| c.is_control() || "/\\:*?\"<>|".contains(c);
-    let name: String = name.chars().map(|c| if unfit(c) { '_' } else { c }).collect();
+    let name = fit_for_file(name);
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let extension = path.extension().map(|e| format!(".{}", e.to_string_lossy())).unwrap_or_default();
     path.with_file_name(format!("{stem}.{name}{extension}"))
+}
+
+/// `name` without what file names of some system cannot have.
+pub fn fit_for_file(name: &str) -> String {
+    let unfit = |c: char| c.is_control() || "/\\:*?\"<>|".contains(c);
+    name.chars().map(|c| if unfit(c) { '_' } else { c }).collect()
 }
 
 /// `path` for one frame: its number in place of the last run of #, as long as that; before the extension where there is none.

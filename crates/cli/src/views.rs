@@ -13,6 +13,9 @@ const USUAL_FPS: f32 = 24.0;
 /// Pictures on a walk between two of its points, where no number is asked for.
 const USUAL_STEPS: u32 = 24;
 
+/// Frames of one command at most: half a day of film.
+const MOST_FRAMES: usize = 1_000_000;
+
 /// How the views follow from one another.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Views {
@@ -49,7 +52,7 @@ impl Views {
         let some_of = |of: u32| -> Result<Range<u32>> {
             let frames = args.frames.clone().unwrap_or(0..of);
             match frames.end <= of {
-                true => Ok(frames),
+                true => few(frames),
                 false => {
                     let message = format!("--frames {}..{}: there are {of}", frames.start, frames.end);
                     Err(AskedWrongly(message).into())
@@ -63,7 +66,7 @@ impl Views {
                 Views::Walk { frames: some_of(of)?, of, points: points.clone() }
             }
             (.., Some(frames)) => {
-                Views::Animation { frames: frames.clone(), fps: args.fps.unwrap_or(USUAL_FPS) }
+                Views::Animation { frames: few(frames.clone())?, fps: args.fps.unwrap_or(USUAL_FPS) }
             }
             _ => Views::Cameras,
         })
@@ -96,6 +99,14 @@ impl Views {
                 walk(chosen, points, frame as f32 / (*of as f32 - 1.0).max(1.0))
             }
         }
+    }
+}
+
+/// The frames, unless they are more than anyone renders.
+fn few(frames: Range<u32>) -> Result<Range<u32>> {
+    match frames.len() <= MOST_FRAMES {
+        true => Ok(frames),
+        false => Err(AskedWrongly(format!("{} frames are more than {MOST_FRAMES}", frames.len())).into()),
     }
 }
 

@@ -47,6 +47,7 @@ impl Scene {
             hasher.update_rayon(texture.texels.as_flattened());
         }
         if let Some(Sky::Image(image)) = &self.sky {
+            words(&mut hasher, image.size());
             floats(&mut hasher, &image.pixels().iter().flat_map(|p| p.to_array()).collect::<Vec<f32>>());
         }
         *hasher.finalize().as_bytes()

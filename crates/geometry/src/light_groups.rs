@@ -28,7 +28,7 @@ impl Scene {
     }
 
     /// Name of each, in the order of [`Scene::emissions`].
-    fn emission_names(&self) -> impl Iterator<Item = &str> {
+    pub fn emission_names(&self) -> impl Iterator<Item = &str> {
         let materials = self.materials.iter().map(|m| &*m.name);
         self.lights.iter().map(|l| &*l.name).chain(materials).chain(self.sky.iter().map(|_| SKY))
     }
@@ -47,7 +47,20 @@ impl Scene {
     /// Makes everything that is called `name` shine `factor` times as bright, channel by channel; returns whether
     /// anything is called so.
     pub fn scale_lights(&mut self, name: &str, factor: Rgb) -> bool {
-        self.scale_lights_if(|n| n == name, factor)
+        let mut any = false;
+        for lamp in self.lights.iter_mut().filter(|l| l.name == name) {
+            lamp.intensity *= factor;
+            any = true;
+        }
+        for material in self.materials.iter_mut().filter(|m| !m.emissive.is_black() && m.name == name) {
+            material.emissive *= factor;
+            any = true;
+        }
+        if name == SKY && self.sky.is_some() {
+            self.sky = self.sky.take().map(|sky| sky.scaled(factor));
+            any = true;
+        }
+        any
     }
 
     /// What [`Scene::scale_lights`] and the like change.
@@ -60,28 +73,24 @@ impl Scene {
         (self.lights, self.materials, self.sky) = (lights.clone(), materials.clone(), sky.clone());
     }
 
-    /// Switches everything off but what `stays` names.
-    pub fn leave_lights(&mut self, stays: impl Fn(&str) -> bool) {
-        self.scale_lights_if(|name| !stays(name), Rgb::BLACK);
-    }
-
-    fn scale_lights_if(&mut self, chosen: impl Fn(&str) -> bool, factor: Rgb) -> bool {
-        let mut any = false;
-        for lamp in self.lights.iter_mut().filter(|l| chosen(&l.name)) {
-            lamp.intensity *= factor;
-            any = true;
+    /// Switches off everything of [`Scene::emissions`] but what `stays` tells by its number.
+    pub fn leave_lights(&mut self, stays: impl Fn(usize) -> bool) {
+        let lamps = self.lights.iter_mut().map(|l| &mut l.intensity);
+        let mut count = 0;
+        for emission in lamps.chain(self.materials.iter_mut().map(|m| &mut m.emissive)) {
+            if !stays(count) {
+                *emission = Rgb::BLACK;
+            }
+            count += 1;
         }
-        for material in self.materials.iter_mut().filter(|m| !m.emissive.is_black() && chosen(&m.name)) {
-            material.emissive *= factor;
-            any = true;
+        if !stays(count) {
+            self.sky = self.sky.take().map(|sky| sky.scaled(Rgb::BLACK));
         }
-        if chosen(SKY) && self.sky.is_some() {
-            self.sky = self.sky.take().map(|sky| sky.scaled(factor));
-            any = true;
-        }
-        any
     }
 }
+
+/// In no group: it shines on nothing, for it is black wherever one looks, or no triangle uses it.
+pub const NO_GROUP: u16 = u16::MAX;
 
 /// Which group everything that shines belongs to.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -114,7 +123,8 @@ impl LightGroups {
         // What shines by a texture that is black everywhere looked up is no light that one samples.
         let mut names = scene.light_names();
         names.retain(|name| power.contains_key(&**name));
-        if names.len() > MOST {
+        let crowded = names.len() > MOST;
+        if crowded {
             let mut ranked = names.clone();
             ranked.sort_by(|a, b| power[&**b].total_cmp(&power[&**a]));
             let strongest = &ranked[..MOST - 1];
@@ -123,7 +133,11 @@ impl LightGroups {
         }
         let number: HashMap<&str, u16> = (0u16..).zip(&names).map(|(i, n)| (&**n, i)).collect();
         let last = names.len().saturating_sub(1) as u16;
-        let of = |name: &str| number.get(name).copied().unwrap_or(last);
+        let of = |name: &str| match number.get(name) {
+            Some(&group) => group,
+            None if crowded && power.contains_key(name) => last,
+            None => NO_GROUP,
+        };
         LightGroups {
             of_emission: scene.emission_names().map(of).collect(),
             of_light: of_lights.iter().map(|n| of(n)).collect(),
@@ -153,7 +167,7 @@ impl LightGroups {
         self.of_light[light as usize] as usize
     }
 
-    /// Group of each of [`Scene::emissions`].
+    /// Group of each of [`Scene::emissions`], or [`NO_GROUP`].
     pub fn of_emissions(&self) -> &[u16] {
         &self.of_emission
     }
@@ -210,7 +224,8 @@ mod tests {
         assert_eq!(scene.lights[2].intensity, Rgb::new(20.0, 10.0, 0.0));
         assert_eq!(scene.lights[1].intensity, Rgb::splat(10.0));
         assert!(!scene.scale_lights("default", Rgb::WHITE), "it does not shine");
-        scene.leave_lights(|name| name == "panel");
+        // Three lamps, the plain material, the panel, the sky.
+        scene.leave_lights(|i| i == 4);
         assert_eq!(scene.light_names(), ["panel"]);
         assert_eq!(scene.materials[1].emissive, Rgb::splat(5.0));
     }

@@ -152,6 +152,11 @@ impl SkyImage {
         pixel(0, 0).lerp(pixel(1, 0), fx).lerp(pixel(0, 1).lerp(pixel(1, 1), fx), fy) * self.strength
     }
 
+    /// Columns and rows.
+    pub fn size(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
+
     /// Factor on the pixels.
     pub fn strength(&self) -> Rgb {
         self.strength

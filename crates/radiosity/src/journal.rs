@@ -15,6 +15,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub struct Journal {
     path: PathBuf,
+    /// The job that records are of.
+    key: [u8; 32],
     /// What was written before, as long as it lasts.
     old: Option<BufReader<File>>,
     /// Where new records go.
@@ -36,7 +38,16 @@ const LONGEST: u64 = 1 << 32;
 impl Journal {
     /// A journal in the file `path`, which need not exist.
     pub fn at(path: &Path) -> Journal {
-        Journal { path: path.into(), old: None, new: None, good: 0, records: 0, recalled: 0, failure: None }
+        Journal {
+            path: path.into(),
+            key: [0; 32],
+            old: None,
+            new: None,
+            good: 0,
+            records: 0,
+            recalled: 0,
+            failure: None,
+        }
     }
 
     /// Rows that were read instead of gathered.
@@ -51,6 +62,9 @@ impl Journal {
 
     /// The work is done: the file goes.
     pub fn remove(self) {
+        if self.new.is_none() {
+            return; // it may be another's
+        }
         // What is left over is found and overwritten by the next solve of that name.
         let _ = std::fs::remove_file(&self.path);
     }
@@ -60,6 +74,8 @@ impl Journal {
         let open = || -> io::Result<(Option<BufReader<File>>, File)> {
             let mut new =
                 File::options().read(true).write(true).create(true).truncate(false).open(&self.path)?;
+            // Two solves of one name would write into one another's records.
+            new.try_lock().map_err(|_| io::Error::other("another solve is at work on it"))?;
             let mut head = [0; HEAD as usize];
             if new.read_exact(&mut head).is_ok() && head == *key {
                 return Ok((Some(BufReader::new(File::open(&self.path)?)), new));
@@ -69,7 +85,7 @@ impl Journal {
             new.write_all(key)?;
             Ok((None, new))
         };
-        (self.good, self.records) = (HEAD, 0);
+        (self.key, self.good, self.records) = (*key, HEAD, 0);
         match open() {
             Ok((old, new)) => (self.old, self.new) = (old, Some(new)),
             Err(e) => self.failure = Some(e),
@@ -88,7 +104,8 @@ impl Journal {
             let length = u64::get(&head).min(LONGEST);
             let mut bytes = Vec::new();
             old.take(length).read_to_end(&mut bytes).ok()?;
-            let whole = bytes.len() as u64 == length && checksum(self.records, &bytes) == head[8..];
+            let whole =
+                bytes.len() as u64 == length && checksum(&self.key, self.records, &bytes) == head[8..];
             whole.then(|| get_rows(&bytes)).flatten().map(|rows| (rows, length))
         });
         match rows.filter(|(rows, _)| rows.len() == count) {
@@ -122,7 +139,7 @@ impl Journal {
         let bytes = put_rows(rows);
         let mut record = Vec::with_capacity(bytes.len() + 40);
         (bytes.len() as u64).put(&mut record);
-        record.extend_from_slice(&checksum(self.records, &bytes));
+        record.extend_from_slice(&checksum(&self.key, self.records, &bytes));
         record.extend_from_slice(&bytes);
         self.records += 1;
         if let Err(e) = file.write_all(&record) {
@@ -131,9 +148,9 @@ impl Journal {
     }
 }
 
-/// Of a record's bytes, and its place among the others.
-fn checksum(number: u64, bytes: &[u8]) -> [u8; 32] {
-    *blake3::Hasher::new().update(&number.to_le_bytes()).update_rayon(bytes).finalize().as_bytes()
+/// Of the job, a record's place among the others, and its bytes.
+fn checksum(key: &[u8; 32], number: u64, bytes: &[u8]) -> [u8; 32] {
+    *blake3::Hasher::new().update(key).update(&number.to_le_bytes()).update_rayon(bytes).finalize().as_bytes()
 }
 
 impl Plain for f16 {

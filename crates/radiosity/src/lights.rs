@@ -1,6 +1,7 @@
 //! Lamps that stay live after the solve: E is linear in what they send out, so each group's part can be scaled by itself.
 
 use crate::solution::{AtSites, Report, Solution};
+use geometry::light_groups::NO_GROUP;
 use geometry::{LightGroups, Rgb, World};
 use thiserror::Error;
 
@@ -61,10 +62,18 @@ impl Lights {
             return Err(RelightError::Count { then: self.emissions.len(), now: now.len() });
         }
         let mut factors: Vec<Option<Rgb>> = vec![None; self.groups.len()];
-        for ((&then, &now), &group) in self.emissions.iter().zip(&now).zip(self.groups.of_emissions()) {
-            let name = || self.groups.names[group as usize].clone();
-            if then.is_black() && now.is_black() {
+        let names = world.scene.emission_names();
+        let groups = self.groups.of_emissions().iter().zip(names);
+        for ((&then, &now), (&group, name)) in self.emissions.iter().zip(&now).zip(groups) {
+            let name = || name.to_string();
+            if now == then || (group == NO_GROUP && now.is_black()) {
+                if group != NO_GROUP && !then.is_black() && factors[group as usize].is_none() {
+                    factors[group as usize] = Some(Rgb::WHITE);
+                }
                 continue;
+            }
+            if group == NO_GROUP {
+                return Err(RelightError::Dark { name: name() });
             }
             let ratio = |then: f32, now: f32| match (then > 0.0, now > 0.0) {
                 (true, _) => Some(now / then),
@@ -111,22 +120,26 @@ impl Solution {
     /// The solution for `world` as its lamps shine now, where they shone otherwise when it was solved; in other respects
     /// the world must be the same ([`geometry::Scene::fingerprint`]).
     pub fn relit(&self, world: &World) -> Result<Solution, RelightError> {
-        let at_sites = self.at_sites.as_ref().ok_or(RelightError::Together)?;
-        let lights = at_sites.lights.as_ref().ok_or(RelightError::Together)?;
-        match lights.factors(world)? {
-            Some(factors) => Ok(self.scaled(at_sites, lights, &factors)),
-            None => Ok(self.clone()),
-        }
+        let (at_sites, lights) = self.kept_apart()?;
+        Ok(match lights.factors(world)? {
+            Some(factors) => self.scaled(at_sites, lights, &factors),
+            None => self.clone(),
+        })
     }
 
     /// The same, of a solution that nobody else needs.
     pub(crate) fn into_relit(self, world: &World) -> Result<Solution, RelightError> {
+        let (at_sites, lights) = self.kept_apart()?;
+        Ok(match lights.factors(world)? {
+            Some(factors) => self.scaled(at_sites, lights, &factors),
+            None => self,
+        })
+    }
+
+    /// What each group of lamps does at the sites, where that is known.
+    pub(crate) fn kept_apart(&self) -> Result<(&AtSites, &Lights), RelightError> {
         let at_sites = self.at_sites.as_ref().ok_or(RelightError::Together)?;
-        let lights = at_sites.lights.as_ref().ok_or(RelightError::Together)?;
-        match lights.factors(world)? {
-            Some(factors) => Ok(self.scaled(at_sites, lights, &factors)),
-            None => Ok(self),
-        }
+        Ok((at_sites, at_sites.lights.as_ref().ok_or(RelightError::Together)?))
     }
 
     fn scaled(&self, at_sites: &AtSites, lights: &Lights, factors: &[Rgb]) -> Solution {
@@ -153,9 +166,13 @@ impl Solution {
         means.map_or(0.0, |[direct, indirect]| direct + indirect)
     }
 
+    /// The groups of lamps whose light is kept apart, if it is.
+    pub fn light_groups(&self) -> Option<&LightGroups> {
+        self.kept_apart().ok().map(|(_, lights)| &lights.groups)
+    }
+
     /// Names of the groups of lamps whose light is kept apart.
     pub fn light_names(&self) -> &[String] {
-        let lights = self.at_sites.as_ref().and_then(|s| s.lights.as_ref());
-        lights.map_or(&[], |lights| &lights.groups.names)
+        self.kept_apart().map_or(&[], |(_, lights)| &lights.groups.names)
     }
 }

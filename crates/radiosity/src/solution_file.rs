@@ -22,6 +22,7 @@ use crate::flags::Flags;
 use crate::lights::{Lights, RelightError};
 use crate::solution::{AtSites, Report, Solution};
 use crate::solver::{Convergence, Gain};
+use geometry::light_groups::NO_GROUP;
 use geometry::{Fingerprint, LightGroups, Rgb, World};
 use rayon::prelude::*;
 use thiserror::Error;
@@ -56,14 +57,13 @@ pub enum FileError {
     #[error("its {0} makes no sense")]
     Senseless(&'static str),
     /// Of another scene.
-    #[error("it was solved for another scene: geometry, materials, or a lamp's place differ: solve again")]
+    #[error(
+        "it was solved for another scene: geometry, materials, the sky or a lamp's place differ: solve again"
+    )]
     OtherScene,
     /// Of a scene with other lamps.
     #[error(transparent)]
     OtherLights(#[from] RelightError),
-    /// Has nothing that could be kept.
-    #[error("a solution by a classical method is not kept in a file")]
-    Classical,
 }
 
 /// What a file says of how it was made.
@@ -107,8 +107,7 @@ record!(Gain { mean: f32, largest: f32 } => Gain { mean, largest });
 
 /// The bytes of a file that holds `solution`, which was solved for `world`.
 pub fn encode(solution: &Solution, world: &World, about: &About) -> Result<Vec<u8>, FileError> {
-    let at_sites = solution.at_sites.as_ref().ok_or(FileError::Classical)?;
-    let lights = at_sites.lights.as_ref().ok_or(RelightError::Together)?;
+    let (at_sites, lights) = solution.kept_apart()?;
     let mut sections: [Vec<u8>; SECTIONS.len()] = Default::default();
     let [text, mesh, sources, sites, flags, photons, lamps] = &mut sections;
     *text = about.text(&world.scene.fingerprint()).into_bytes();
@@ -312,7 +311,7 @@ fn get_lights(from: &mut Reader, sites: usize) -> Option<Lights> {
         names.iter().map(|_| from.all().filter(|part: &Vec<Rgb>| part.len() == sites)).collect()
     };
     let (indirect, direct) = (parts()?, parts()?);
-    let known = of_emissions.iter().all(|&g| (g as usize) < names.len().max(1));
+    let known = of_emissions.iter().all(|&g| (g as usize) < names.len() || g == NO_GROUP);
     let finite = indirect.iter().chain(&direct).flatten().all(|e| e.is_finite());
     (known && finite && of_emissions.len() == emissions.len()).then(|| Lights {
         groups: LightGroups::stored(names, of_emissions),

@@ -6,13 +6,13 @@ use crate::render::{
     Integrator, Outcome, PROBE_RAYS, PROBE_SHARE, Progress, Report, Settings, facts, render,
 };
 use crate::verify::Probes;
-use geometry::light_groups::OTHERS;
+use geometry::light_groups::NO_GROUP;
 use geometry::{Camera, LightGroups, Rgb, Scene, World};
 use radiosity::Solution;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-/// Name of the layer of surfaces that show without being lit (KHR_materials_unlit).
+/// Name of the layer of what shows without lighting anything, as KHR_materials_unlit does.
 pub const UNLIT: &str = "unlit";
 
 /// A group that makes the share s of the light may be rougher by itself by the factor s^-this. 1/2 would do if it made that
@@ -30,11 +30,15 @@ pub fn render_by_light(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Outcome, radiosity::Error> {
-    let mut names = match solution {
-        Some(solution) => solution.light_names().to_vec(),
-        None => LightGroups::new(world).names,
+    let groups = match solution.and_then(Solution::light_groups) {
+        Some(groups) => groups.clone(),
+        None => LightGroups::new(world),
     };
-    if world.scene.materials.iter().any(|m| m.unlit) {
+    let mut names = groups.names.clone();
+    let shows = |(&group, emission): (&u16, Rgb)| group == NO_GROUP && !emission.is_black();
+    let emissions = world.scene.emissions();
+    if world.scene.materials.iter().any(|m| m.unlit) || groups.of_emissions().iter().zip(emissions).any(shows)
+    {
         names.push(UNLIT.into());
     }
     let as_it_was = world.scene.lights_and_materials();
@@ -43,7 +47,7 @@ pub fn render_by_light(
     let (mut by_light, mut finished) = (Vec::new(), true);
     let mut stages: BTreeMap<&'static str, f64> = BTreeMap::new();
     for (i, name) in names.iter().enumerate() {
-        leave(&mut world.scene, name, &names);
+        leave(&mut world.scene, &groups, i);
         world.relight();
         // It was solved for these very lamps, so that it can be had for some of them.
         let lit = solution.map(|s| s.relit(world).expect("the solution keeps the lamps of this world apart"));
@@ -110,14 +114,15 @@ impl Progress for Unseen<'_> {
     }
 }
 
-/// Leaves of all that shines or shows by itself what is called `name`.
-fn leave(scene: &mut Scene, name: &str, names: &[String]) {
-    scene.leave_lights(|n| match name {
-        UNLIT => false,
-        OTHERS => n == OTHERS || !names.iter().any(|known| known == n),
-        name => n == name,
+/// Leaves of all that shines or shows by itself one group, or with a number beyond the groups what is in none.
+fn leave(scene: &mut Scene, groups: &LightGroups, number: usize) {
+    let rest = number >= groups.len();
+    scene.leave_lights(|i| match groups.of_emissions().get(i) {
+        Some(&NO_GROUP) => rest,
+        Some(&group) => group as usize == number,
+        None => false,
     });
-    for material in scene.materials.iter_mut().filter(|m| m.unlit && name != UNLIT) {
+    for material in scene.materials.iter_mut().filter(|m| m.unlit && !rest) {
         material.base_color = Rgb::BLACK;
     }
 }

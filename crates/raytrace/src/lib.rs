@@ -5,25 +5,11 @@
 //! film with its layers, [`tonemap`] a picture for a screen, and [`metrics`] compares two pictures.
 //!
 //! ```no_run
-//! use raytrace::{DiffuseMode, Integrator, Settings, exr, render};
+//! use raytrace::{Settings, exr, render};
 //!
 //! let room = geometry::gltf::load("assets/cornell-box.gltf".as_ref())?;
 //! let world = geometry::World::new(room.scene);
-//! let settings = Settings {
-//!     width: 512,
-//!     height: 512,
-//!     seed: 1,
-//!     error: 0.02,
-//!     integrator: Integrator::Hybrid,
-//!     diffuse: DiffuseMode::Split,
-//!     deadline: None,
-//!     classical: None,
-//!     gather_rays: None,
-//!     samples: None,
-//!     verify: true,
-//!     keep_solution: false,
-//!     by_light: false,
-//! };
+//! let settings = Settings { error: 0.01, ..Settings::default() };
 //! // Without a solution it makes its own; for many views, pass that of `prepass`.
 //! let outcome = render(&world, &room.cameras[0], None, &settings, &())?;
 //! exr::write(&outcome.film, &[], &exr::Metadata::default(), "cornell.exr".as_ref())?;

@@ -76,6 +76,27 @@ pub struct Settings {
     pub by_light: bool,
 }
 
+impl Default for Settings {
+    /// 512 × 512 pixels at 2 % by the two passes, verified.
+    fn default() -> Settings {
+        Settings {
+            width: 512,
+            height: 512,
+            seed: 1,
+            error: 0.02,
+            integrator: Integrator::Hybrid,
+            diffuse: DiffuseMode::Split,
+            classical: None,
+            deadline: None,
+            gather_rays: None,
+            samples: None,
+            verify: true,
+            keep_solution: false,
+            by_light: false,
+        }
+    }
+}
+
 /// Of the square of the error asked, the share that samples may leave as noise; the rest is for the first pass.
 const NOISE_SHARE: f32 = 0.5;
 /// What the first pass is asked for, in units of the error asked.

@@ -57,7 +57,7 @@ pub struct RenderArgs {
     /// Take the indirect light from this file, made by `solve`
     #[arg(long, value_name = "ROOM.twl")]
     pub solution: Option<PathBuf>,
-    /// Stop after this time with what there is: 60s, 5m, 1h
+    /// Stop after this time with what there is, each picture of several: 60s, 5m, 1h
     #[arg(long, value_name = "TIME", value_parser = values::duration)]
     pub time_limit: Option<Duration>,
     #[command(flatten)]

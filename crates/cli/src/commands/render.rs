@@ -2,7 +2,7 @@
 
 use super::{print, snapshots};
 use crate::args::RenderArgs;
-use crate::job::{RenderJob, Shot, with_name};
+use crate::job::{AskedWrongly, RenderJob, Shot, with_name};
 use crate::picture::{Picture, save};
 use crate::progress::Bars;
 use crate::room::{Room, lap, start_threads};
@@ -11,7 +11,7 @@ use anyhow::{Context, Result};
 use geometry::Camera;
 use radiosity::Solution;
 use raytrace::tonemap::incident_exposure;
-use raytrace::{Integrator, Settings, exr, prepass_for, render, render_by_light};
+use raytrace::{Integrator, Settings, prepass_for, render, render_by_light};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -31,6 +31,9 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
     let frames = job.frames();
     let time = frames.iter().flatten().next().and_then(|&frame| job.views.time(frame));
     let room = Room::open(&job.scene, &job.which_at(time), &job.light, &bars)?;
+    if time.is_some() && room.cameras.is_empty() {
+        return Err(AskedWrongly("an animation is seen by a camera, and the file has none".into()).into());
+    }
     let choice = cameras::choose(job.camera.as_deref(), &room.cameras, &room.world.scene)?;
     if let Some(note) = &choice.note {
         bars.note(&format!("note: {note}"));
@@ -39,9 +42,9 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
     let mut work = Work::new(&job, &bars, room, &choice.cameras)?;
     let shots = job.shots(frames, &choice.cameras)?;
     let wanted = job.views.frames().map_or(shots.len(), |frames| frames.len());
-    let mut missed = false;
+    let (mut missed, mut done) = (false, 0);
     for shot in shots {
-        if job.skip_existing && exr::is_finished(&shot.output) {
+        if job.is_there(&shot.output, shot.preview.as_deref()) {
             continue;
         }
         let picture = work.picture(&shot)?;
@@ -58,12 +61,12 @@ pub fn run(args: RenderArgs) -> Result<ExitCode> {
             print(&if shot.frame.is_some() { picture.short_line() } else { picture.line() })?;
         }
         work.pictures.push(picture);
+        done += 1;
         if bars.interrupted() {
             break;
         }
     }
-    let report =
-        Report { skipped: wanted - work.pictures.len(), warnings, pictures: work.pictures, scene: job.scene };
+    let report = Report { skipped: wanted - done, warnings, pictures: work.pictures, scene: job.scene };
     match job.json {
         true => print(&serde_json::to_string_pretty(&report)?)?,
         false if wanted > 1 => print(&report.summary(start.elapsed().as_secs_f64()))?,

@@ -10,7 +10,7 @@ use anyhow::{Context, Result};
 use radiosity::Journal;
 use radiosity::solution_file::About;
 use raytrace::output::check_writable;
-use raytrace::{DiffuseMode, Integrator, Settings, prepass_resumable};
+use raytrace::{DiffuseMode, Settings, prepass_resumable};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -36,20 +36,12 @@ pub fn run(args: &SolveArgs) -> Result<ExitCode> {
         None => Vec::new(),
     };
     let settings = Settings {
-        width: 1,
-        height: 1,
         seed: args.run.seed,
         error: args.error,
-        integrator: Integrator::Hybrid,
         // The mode that asks most of the vertices: who renders chooses his own.
         diffuse: DiffuseMode::Vertex,
-        classical: None,
-        deadline: None,
-        gather_rays: None,
-        samples: None,
-        verify: false,
-        keep_solution: false,
         by_light: true,
+        ..Settings::default()
     };
     let mut clock = Instant::now();
     let partial = partial(&args.output);

@@ -164,6 +164,8 @@ fn orbits_and_walks_are_numbered() {
     for wrong in [
         &["-o", "a.exr", "--orbit", "4", "--frames", "2..6"][..],
         &["-o", "a.exr", "--walk", "0,0,0"],
+        &["-o", "a.exr", "--frames", "0..4294967295"],
+        &["-o", "a.exr", "--orbit", "4294967295"],
         &["-o", "a.exr", "--frames", "0..2", "--time", "1"],
         &["-o", "a.exr", "--steps", "3"],
     ] {

@@ -113,6 +113,44 @@ fn the_layers_of_lights_sum_to_the_picture() {
     assert!(off < 0.1, "8 % and 4 % are at most 9 % apart: {off}");
 }
 
+/// Names and materials that mean something else to us, or nothing to anyone.
+#[test]
+fn odd_lamps_have_layers_too() {
+    let dir = folder();
+    room(dir.path());
+    let text = fs::read_to_string(dir.path().join("room.gltf")).expect("it is there");
+    let mut json: serde_json::Value = serde_json::from_str(&text).expect("it is JSON");
+    let last = json["nodes"].as_array().expect("nodes").len() - 1;
+    json["nodes"][last]["name"] = "unlit".into();
+    let materials = json["materials"].as_array_mut().expect("it has materials");
+    // One that nothing uses, and a wall that shows its own colour.
+    materials.push(serde_json::json!({ "name": "東京", "emissiveFactor": [1.0, 1.0, 1.0] }));
+    let red = materials.iter_mut().find(|m| m["name"] == "red").expect("the red wall");
+    red["extensions"] = serde_json::json!({ "KHR_materials_unlit": {} });
+    red["emissiveFactor"] = serde_json::json!([0.5, 0.5, 0.5]);
+    json["extensionsUsed"].as_array_mut().expect("it uses some").push("KHR_materials_unlit".into());
+    fs::write(dir.path().join("room.gltf"), json.to_string()).expect("it can be written");
+    let run = render(dir.path(), "a.exr", &["--light-layers", "--error", "20%"]);
+    assert_eq!(run.status, 0, "{}", run.err);
+    let layer = |name: &str| raytrace::exr::read_layer(&dir.path().join("a.exr"), name).expect(name).pixels;
+    let mut sum = layer("light.lamp");
+    for name in ["light.unlit", "light.unlit 2"] {
+        let part = layer(name);
+        assert!(part.iter().any(|c| c.luminance() > 0.0), "{name} is black");
+        sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
+    }
+    let all = pixels(dir.path(), "a.exr");
+    let far = |(a, b): (&Rgb, &Rgb)| (*a - *b).map(f32::abs).max_channel() > 3e-3 * (b.max_channel() + 1e-2);
+    assert_eq!(sum.iter().zip(&all).filter(|&p| far(p)).count(), 0);
+
+    // Solved in the dark it serves no one who switches the light on, and says which.
+    let dark = ["--light", "lamp=0", "--light", "unlit=0"];
+    assert_eq!(solve(dir.path(), &dark).status, 0);
+    let lit = render(dir.path(), "b.exr", &["--solution", "room.twl", "--light", "unlit=0"]);
+    assert!(lit.status == 1 && lit.err.contains("\"lamp\" did not shine"), "{} {}", lit.status, lit.err);
+    assert_eq!(render(dir.path(), "b.exr", &[&["--solution", "room.twl"], &dark[..]].concat()).status, 0);
+}
+
 #[test]
 fn a_file_that_is_not_what_was_written_is_refused() {
     let dir = folder();

@@ -1,8 +1,8 @@
 //! The Cornell box baked: its light is all there, its charts lie apart, and it looks as the room does.
 
 use super::{Baked, Light, Settings, Target, bake, write};
+use crate::render;
 use crate::tonemap::white_of_exposure;
-use crate::{DiffuseMode, Integrator, render};
 use geometry::sampling::{self, Rng};
 use geometry::{Camera, Ray, Rgb, Surface, Vec2, World, gltf};
 use radiosity::element::Side;
@@ -68,17 +68,9 @@ fn a_baked_room_looks_as_the_room_does() {
     let picture = crate::Settings {
         width: SIDE,
         height: SIDE,
-        seed: 3,
         error: 0.03,
-        integrator: Integrator::Hybrid,
-        diffuse: DiffuseMode::Split,
-        deadline: None,
-        classical: None,
-        gather_rays: None,
-        samples: None,
         verify: false,
-        keep_solution: false,
-        by_light: false,
+        ..crate::Settings::default()
     };
     let film = render(&room.world, &room.cameras[0], Some(&room.solution), &picture, &()).unwrap().film;
     let white = white_of_exposure(EV);

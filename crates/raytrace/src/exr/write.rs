@@ -44,15 +44,33 @@ pub fn write(
     for (name, names, format, get) in triples {
         channels.extend(layer(names.map(|c| format!("{name}.{c}")), format, n, |i| get(&film.pixels[i])));
     }
-    for (name, part) in by_light {
-        // A point divides a layer's name from its channel's.
-        let name = name.replace('.', "_");
+    let layers = layer_names(by_light.iter().map(|(name, _)| &**name));
+    for (name, (_, part)) in layers.iter().zip(by_light) {
         let names = RGB.map(|c| format!("light.{name}.{c}"));
         channels.extend(layer(names, Format::Fitting, n, |i| part[i].to_array()));
     }
     channels.extend(layer(["depth.Z"], Format::Float, n, |i| [film.pixels[i].depth]));
     channels.extend(layer(["variance.Y"], Format::Fitting, n, |i| [film.pixels[i].variance]));
     save(channels, film.width, film.height, metadata, path)
+}
+
+/// Names as a file can hold them: without the point that divides a layer's name from its channel's, not too long (OpenEXR
+/// allows 255 bytes with the channel), all different.
+fn layer_names<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
+    const LONGEST: usize = 200;
+    let mut fitted: Vec<String> = Vec::new();
+    for name in names {
+        let unfit = |c: char| if c == '.' || c.is_control() { '_' } else { c };
+        let mut name: String = name.chars().map(unfit).collect();
+        while name.len() > LONGEST {
+            name.pop();
+        }
+        let taken = |name: &String| fitted.contains(name);
+        let numbered = (2..).map(|n| format!("{name} {n}"));
+        let free = std::iter::once(name.clone()).chain(numbered).find(|name| !taken(name));
+        fitted.push(free.unwrap_or_default());
+    }
+    fitted
 }
 
 /// Writes a plain picture as R, G, B to `path`, atomically.
@@ -85,7 +103,7 @@ fn layer<const C: usize>(
         true => FlatSamples::F16((0..n).map(|i| f16::from_f32(get(i)[c])).collect()),
         false => FlatSamples::F32((0..n).map(|i| get(i)[c]).collect()),
     };
-    names.iter().enumerate().map(|(c, name)| AnyChannel::new(name.as_ref(), samples(c))).collect()
+    names.iter().enumerate().map(|(c, name)| AnyChannel::new(text(name.as_ref()), samples(c))).collect()
 }
 
 /// Whether half floats hold a layer whose largest number is `peak`: none above their own largest, 65504, and the
@@ -175,6 +193,20 @@ mod tests {
     use super::*;
     use geometry::Vec3;
     use geometry::math::Mat4;
+
+    #[test]
+    fn layers_have_names_that_a_file_can_hold() {
+        let long = "é".repeat(300);
+        let names = layer_names(["a.b", "a_b", "東京", "x\0y", &long, &long].into_iter());
+        assert_eq!(names[..4], ["a_b", "a_b 2", "東京", "x_y"]);
+        assert!(names[4].len() <= 200 && names[5] == format!("{} 2", names[4]));
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.exr");
+        let part = vec![Rgb::WHITE; 35];
+        let layers: Vec<_> = ["東京", "a.b", "a_b", &long].map(|n| (n.to_string(), part.clone())).into();
+        write(&film(), &layers, &Metadata::default(), &path).unwrap();
+        assert_eq!(read_layer(&path, "light.a_b 2").unwrap().pixels, part);
+    }
 
     /// A small film whose every layer differs from pixel to pixel.
     fn film() -> Film {
