@@ -99,9 +99,9 @@ pub struct Meter<'a> {
 }
 
 impl<'a> Meter<'a> {
-    /// For readings whose noise is below `error` (0.01 is 1 %), as far as [`MOST`] estimates go.
+    /// For readings whose noise is below `error` (0.01 is 1 %), as far as `MOST` estimates go.
     ///
-    /// The rays of one estimate are chosen so that [`FEWEST`] of them suffice in most rooms.
+    /// The rays of one estimate are chosen so that `FEWEST` of them suffice in most rooms.
     pub fn new(world: &'a World, solution: &'a Solution, error: f32, seed: u64) -> Meter<'a> {
         let rays = (128.0 * (0.01 / error.clamp(1e-4, 1.0)).powf(1.25)).clamp(16.0, 2048.0);
         let pattern = Lattice2::new((rays as u32).next_multiple_of(8));
