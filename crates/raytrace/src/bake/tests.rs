@@ -137,6 +137,8 @@ fn more_vertices_leave_less_error() {
     let (few, many) = (error(1), error(20_000));
     assert_eq!(few.error, few.first_error);
     assert!(few.out_of_vertices);
+    // Seven rounds of a fifth more vertices are 3.6 times as many; what is left is at the shadows' edges, where the error
+    // falls as the root of their number: to 0.53. Measured 0.50.
     assert!(many.error < few.error.map(|e| 0.6 * e), "{:?} → {:?}", few.error, many.error);
     assert!(many.vertices > few.vertices);
 }
