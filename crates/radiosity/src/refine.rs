@@ -12,7 +12,7 @@ use crate::importance::Importance;
 use crate::journal::Journal;
 use crate::reach::Reach;
 use crate::solve::{Config, Progress};
-use crate::solver::{self, Convergence, Gain};
+use crate::solver::{self, Convergence};
 use crate::transport::{Landing, Transport};
 use geometry::math::offset_origin;
 use geometry::sampling::Lattice2;
@@ -482,13 +482,9 @@ impl<'a> Refiner<'a> {
     ) -> Solved {
         let transport = self.transport(flags);
         let norm = transport.norm();
-        // While the mesh is being refined a rough bound will do.
-        let gain = match flags.is_empty() {
-            true => Gain::of_norm(norm.min(0.9)),
-            false => solver::gain(self.e.len(), |e| transport.reflect(e, &[])),
-        };
-        let (e, convergence) =
-            solver::solve(self.e.clone(), gain, tolerance, most, |e| transport.apply(e, extra));
+        let reflect = |e: &[Rgb]| transport.reflect(e, &[]);
+        let apply = |e: &[Rgb]| transport.apply(e, extra);
+        let (e, convergence) = solver::solve(self.e.clone(), tolerance, most, apply, reflect);
         let variance = transport.variance(&e);
         // Each group of lights by itself, on the same rows: E is their sum.
         let settled = !flags.is_empty();
@@ -503,7 +499,7 @@ impl<'a> Refiner<'a> {
                     sum.iter_mut().zip(&direct).for_each(|(sum, &d)| *sum += d);
                     sum
                 };
-                solver::solve(direct.clone(), gain, bound, most, apply).0
+                solver::solve(direct.clone(), bound, most, apply, reflect).0
             })
             .collect();
         Solved { e, parts, variance, convergence, norm }

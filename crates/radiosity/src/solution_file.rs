@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! "twolight"                        8 bytes
-//! format                            u32, 1
+//! format                            u32, 2
 //! number of sections                u32
 //! for each: name, length, BLAKE3    8 + 8 + 32 bytes
 //! BLAKE3 of all that                32 bytes
@@ -14,21 +14,21 @@
 //! the indirect and the direct irradiance there (lx), `flags` what pass 2 is to mistrust, `photons` a k-d tree, `lights`
 //! the groups of lamps and the light of each by itself. Every section is checked before it is believed.
 
-use crate::bytes::{Plain, Reader, get_sources, put_all, put_sources, record};
+use crate::bytes::{Plain, Reader, get_sources, put_all, put_sources};
 use crate::caustic::Caustics;
 use crate::element::{Elements, Node, Vertex, VertexId};
 use crate::field::{Source, Sources};
 use crate::flags::Flags;
 use crate::lights::{Lights, RelightError};
 use crate::solution::{AtSites, Report, Solution};
-use crate::solver::{Convergence, Gain};
+use crate::solver::Convergence;
 use geometry::light_groups::NO_GROUP;
 use geometry::{Fingerprint, LightGroups, Rgb, World};
 use rayon::prelude::*;
 use thiserror::Error;
 
 const MAGIC: &[u8; 8] = b"twolight";
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 const SECTIONS: [&str; 7] = ["about", "mesh", "sources", "sites", "flags", "photons", "lights"];
 /// Bytes of a section's line in the table.
 const LINE: usize = 8 + 8 + 32;
@@ -102,8 +102,6 @@ impl About {
         Some((About { program, error, seed, cameras }, scene))
     }
 }
-
-record!(Gain { mean: f32, largest: f32 } => Gain { mean, largest });
 
 /// The bytes of a file that holds `solution`, which was solved for `world`.
 pub fn encode(solution: &Solution, world: &World, about: &About) -> Result<Vec<u8>, FileError> {
@@ -257,7 +255,6 @@ fn put_report(r: &Report, out: &mut Vec<u8>) {
     let c = &r.convergence;
     [c.iterations, u32::from(c.converged)].put(out);
     [c.residual, c.bound].put(out);
-    c.gain.put(out);
     [r.norm, r.balance, r.flagged].put(out);
     [r.mean, r.caustic_flux].put(out);
 }
@@ -267,10 +264,9 @@ fn get_report(from: &mut Reader) -> Option<Report> {
         from.one::<[u64; 6]>()?.map(|n| n as usize);
     let [iterations, converged] = from.one()?;
     let [residual, bound] = from.one()?;
-    let gain = from.one()?;
     let [norm, balance, flagged] = from.one()?;
     let [mean, caustic_flux] = from.one()?;
-    let convergence = Convergence { iterations, residual, bound, gain, converged: converged != 0 };
+    let convergence = Convergence { iterations, residual, bound, converged: converged != 0 };
     Some(Report {
         solver: String::new(),
         vertices,

@@ -9,17 +9,20 @@ use rayon::prelude::*;
 /// Differences kept for the extrapolation: at albedo 0.99 five bring 341 iterations down to 28.
 const HISTORY: usize = 5;
 
+/// Terms of the series in [`outstanding`] that are summed before the rest is taken as geometric.
+const TERMS: usize = 6;
+/// What is this much darker than the mean is as dark as this, when errors there are weighed.
+const DIM: f32 = 0.1;
+
 /// How a solve ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Convergence {
-    /// Applications of K.
+    /// Applications of K that brought the values forward.
     pub iterations: u32,
     /// Largest |D + K E − E| over sites and channels, lx.
     pub residual: f32,
-    /// Values are on average no further than this from the fixed point, lx: residual · mean gain.
+    /// Values are on average no further than this from the fixed point, lx: see [`outstanding`].
     pub bound: f32,
-    /// Row sums of (I − K)⁻¹, or a little more: how much light a place gets per light given everywhere.
-    pub gain: Gain,
     /// Whether the bound asked for was met.
     pub converged: bool,
 }
@@ -27,30 +30,31 @@ pub struct Convergence {
 /// Iterates E ← D + K E from `start` until values are on average no further than `tolerance` (lx) from the fixed point.
 ///
 /// - `apply`: E to D + K E.
-/// - `gain`: an upper bound on the row sums of (I − K)⁻¹, see [`gain`]; |E − E*| ≤ row sum · |residual| at each site.
+/// - `reflect`: E to K E, for the bound.
 ///
 /// Anderson acceleration (Walker and Ni, "Anderson Acceleration for Fixed-Point Iterations", SIAM J. Numer. Anal.
-/// 49(4), 2011, alg. 2.2), least squares by normal equations in f64. A step that makes the residual grow is taken
-/// back to the plain one.
+/// 49(4), 2011, alg. 2.2), least squares by normal equations in f64.
 pub fn solve(
     start: Vec<Rgb>,
-    gain: Gain,
     tolerance: f32,
     most: u32,
     apply: impl Fn(&[Rgb]) -> Vec<Rgb>,
+    reflect: impl Fn(&[Rgb]) -> Vec<Rgb>,
 ) -> (Vec<Rgb>, Convergence) {
     let mut x = start;
-    let mut report = Convergence { gain, ..Convergence::default() };
+    let mut report = Convergence::default();
+    let mut bound = Bound::default();
     let (mut dg, mut df): (Vec<Vec<Rgb>>, Vec<Vec<Rgb>>) = (Vec::new(), Vec::new());
     let mut previous: Option<(Vec<Rgb>, Vec<Rgb>)> = None; // g(x) and f = g(x) − x of the last step
     loop {
         let g = apply(&x);
-        let f: Vec<Rgb> = g.par_iter().zip(&x).map(|(&g, &x)| g - x).collect();
+        let f = difference(&g, &x);
         report.iterations += 1;
         report.residual = f.par_iter().map(|f| f.map(f32::abs).max_channel()).reduce(|| 0.0, f32::max);
-        report.bound = gain.mean * report.residual;
+        let last = report.iterations >= most || !report.residual.is_finite();
+        report.bound = bound.of(&f, &x, if last { f32::INFINITY } else { tolerance }, &reflect);
         report.converged = report.bound <= tolerance;
-        if report.converged || report.iterations >= most || !report.residual.is_finite() {
+        if last || report.converged {
             return (g, report);
         }
         if let Some((g0, f0)) = previous.take() {
@@ -75,43 +79,67 @@ pub fn solve(
     }
 }
 
-/// Upper bounds on the row sums of (I − K)⁻¹; infinite when none is known.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Gain {
-    /// Over sites.
-    pub mean: f32,
-    /// ‖(I − K)⁻¹‖∞: no single value is further than this times the residual from the fixed point.
-    pub largest: f32,
+/// [`outstanding`], worked out only where the last one gives reason to hope that it is small enough.
+struct Bound {
+    /// What a residual brings in all, by the last that was worked out: itself at least.
+    gain: f32,
 }
 
-impl Gain {
-    /// From the norm of K alone: 1 / (1 − ‖K‖∞).
-    pub fn of_norm(norm: f32) -> Gain {
-        let gain = if norm < 1.0 { 1.0 / (1.0 - norm) } else { f32::INFINITY };
-        Gain { mean: gain, largest: gain }
+impl Default for Bound {
+    fn default() -> Bound {
+        Bound { gain: 1.0 }
     }
 }
 
-/// The gain of a K without negative entries.
-///
-/// (I − K)⁻¹ 1 holds the row sums. Any s with 1 + K s ≤ s is at least that (K is monotone); an approximate solution
-/// of s = 1 + K s becomes one when divided by 1 minus its largest residual. Far tighter than 1 / (1 − ‖K‖∞), which
-/// a single white corner sets for the whole room.
-///
-/// - `apply`: s to K s.
-pub fn gain(sites: usize, apply: impl Fn(&[Rgb]) -> Vec<Rgb>) -> Gain {
-    let one_more = |s: &[Rgb]| apply(s).into_iter().map(|k| k + Rgb::WHITE).collect::<Vec<_>>();
-    // A residual of a quarter makes the bound at most 4/3 of the truth, after a handful of steps at albedo 0.5.
-    let unit = Gain { mean: 1.0, largest: 1.0 };
-    let (s, _) = solve(vec![Rgb::splat(2.0); sites], unit, 0.25, 100, one_more);
-    let next = one_more(&s);
-    let excess = next.iter().zip(&s).map(|(n, s)| (*n - *s).max_channel()).fold(0.0, f32::max);
-    let largest = s.iter().map(|s| s.max_channel()).fold(1.0, f32::max);
-    if excess >= 1.0 || !largest.is_finite() {
-        return Gain::of_norm(1.0);
+impl Bound {
+    /// The bound of values `x` with the residual `f`; a guess where that is more than `wanted` (lx).
+    fn of(&mut self, f: &[Rgb], x: &[Rgb], wanted: f32, reflect: impl Fn(&[Rgb]) -> Vec<Rgb>) -> f32 {
+        let left = weighed(f, x);
+        if left * self.gain <= wanted && left > 0.0 {
+            let bound = outstanding(f, x, reflect);
+            // After one that is infinite there may be others that are not.
+            self.gain = (bound / left).min(1000.0);
+            return bound;
+        }
+        left * self.gain
     }
-    let mean = s.iter().map(|s| f64::from(s.max_channel())).sum::<f64>() / s.len().max(1) as f64;
-    Gain { mean: (mean as f32).max(1.0) / (1.0 - excess), largest: largest / (1.0 - excess) }
+}
+
+/// How far values `x` with the residual `f` = D + K x − x are on average from the fixed point, lx, at most: the light that the
+/// residual would bring yet at every bounce, Σ |K|ᵏ |f|, whatever its sign; what is dim counts as if it were as bright as
+/// the mean, up to ten times. Infinite where light does not fade.
+///
+/// The first terms are summed, the rest is a geometric series of the last two's ratio. The largest residual times
+/// ‖(I − K)⁻¹‖∞ would bound every value, but a few folds between white surfaces set it: in a furnished room of 400 000
+/// triangles it asked for 74 iterations and 39 more for the norm, where the mean of the values stood still after 15.
+fn outstanding(f: &[Rgb], x: &[Rgb], reflect: impl Fn(&[Rgb]) -> Vec<Rgb>) -> f32 {
+    let mut left: Vec<Rgb> = f.par_iter().map(|f| f.map(f32::abs)).collect();
+    let mut term = weighed(&left, x);
+    let mut sum = term;
+    for k in 1..=TERMS {
+        if term == 0.0 {
+            break;
+        }
+        left = reflect(&left);
+        let ratio = weighed(&left, x) / term;
+        term *= ratio;
+        sum += term;
+        let rest = if ratio < 1.0 { term * ratio / (1.0 - ratio) } else { f32::INFINITY };
+        if k == TERMS || rest <= 0.01 * sum {
+            return sum + rest;
+        }
+    }
+    sum
+}
+
+/// Mean of `errors` (the largest channel of each) at values `x`, with more weight where these are dim.
+fn weighed(errors: &[Rgb], x: &[Rgb]) -> f32 {
+    // In order and in f64: the same bits whatever the number of threads.
+    let level = x.iter().map(|x| f64::from(x.mean())).sum::<f64>() / x.len().max(1) as f64;
+    let weight = |x: &Rgb| (level / f64::from(x.mean()).max(f64::from(DIM) * level).max(1e-300)).max(1.0);
+    let sum: f64 =
+        errors.iter().zip(x).map(|(e, x)| f64::from(e.map(f32::abs).max_channel()) * weight(x)).sum();
+    (sum / x.len().max(1) as f64) as f32
 }
 
 fn difference(a: &[Rgb], b: &[Rgb]) -> Vec<Rgb> {
@@ -181,24 +209,49 @@ mod tests {
         }
     }
 
+    fn mean_error(e: &[Rgb], exact: &[Rgb]) -> f32 {
+        let sum: f32 = e.iter().zip(exact).map(|(a, b)| (*a - *b).map(f32::abs).max_channel()).sum();
+        sum / e.len() as f32
+    }
+
     #[test]
     fn the_bound_holds_at_every_reflectance() {
         for rho in [0.2, 0.5, 0.8, 0.95, 0.99] {
-            let exact = solve(vec![Rgb::BLACK; 50], Gain::of_norm(rho), 1e-7, 20_000, ring(rho, 1.0)).0;
-            let gain = gain(50, ring(rho, 0.0));
-            // All rows sum to rho here, so the gain is 1 / (1 − rho) and the bound at most 4/3 of it.
-            assert!((0.99..1.4).contains(&(gain.largest * (1.0 - rho))), "{rho}: {gain:?}");
-            let (e, report) = solve(vec![Rgb::BLACK; 50], gain, 1e-3, 2000, ring(rho, 1.0));
+            let exact = solve(vec![Rgb::BLACK; 50], 1e-7, 20_000, ring(rho, 1.0), ring(rho, 0.0)).0;
+            let (e, report) = solve(vec![Rgb::BLACK; 50], 1e-3, 2000, ring(rho, 1.0), ring(rho, 0.0));
             assert!(report.converged, "{rho}: {report:?}");
-            let error =
-                e.iter().zip(&exact).map(|(a, b)| (*a - *b).map(f32::abs).max_channel()).fold(0.0, f32::max);
+            let error = mean_error(&e, &exact);
             // The exact one is within 1e-4 here: f32 sums of 100 with 1e-7 relative rounding.
-            assert!(
-                error <= report.gain.largest * report.residual + 1e-4,
-                "{rho}: error {error}, bound {}",
-                report.bound
-            );
+            assert!(error <= report.bound + 1e-4, "{rho}: error {error}, {report:?}");
         }
+    }
+
+    /// A residual that is the same everywhere comes back 1 / (1 − ρ) times in a room that is ρ all over.
+    #[test]
+    fn what_a_residual_brings_is_the_sum_of_its_bounces() {
+        for rho in [0.0, 0.3, 0.9, 0.99f32] {
+            let (f, x) = (vec![Rgb::splat(-0.01); 50], vec![Rgb::WHITE; 50]);
+            let got = outstanding(&f, &x, ring(rho, 0.0));
+            assert!((got * (1.0 - rho) / 0.01 - 1.0).abs() < 0.01, "{rho}: {got}");
+        }
+    }
+
+    /// Two cells of a hundred keep nearly all of their light between them: their error may last, that of the rest may not.
+    #[test]
+    fn a_fold_between_white_surfaces_does_not_hold_up_the_rest() {
+        let room = |lamp: f32| {
+            move |e: &[Rgb]| -> Vec<Rgb> {
+                let mut next = ring(0.5, lamp)(&e[..98]);
+                next.extend([e[99] * 0.997 + e[0] * 0.001, e[98] * 0.997 + e[1] * 0.001]);
+                next
+            }
+        };
+        let exact = solve(vec![Rgb::BLACK; 100], 1e-6, 5000, room(1.0), room(0.0)).0;
+        let tolerance = 0.01 * exact.iter().map(|e| e.mean()).sum::<f32>() / 100.0;
+        let (e, report) = solve(vec![Rgb::BLACK; 100], tolerance, 500, room(1.0), room(0.0));
+        let error = mean_error(&e, &exact);
+        assert!(report.converged && report.iterations < 40, "{report:?}");
+        assert!(error <= report.bound && report.bound <= tolerance, "{error}, {report:?}");
     }
 
     #[test]
@@ -206,24 +259,24 @@ mod tests {
         // A room of 60 cells that all see one another unevenly, reflectance 0.99, a lamp at the first.
         let n = 60;
         let weight = |i: usize, j: usize| if i == j { 0.0 } else { 1.0 + ((7 * i * j + i + j) % 13) as f32 };
-        let room = |e: &[Rgb]| -> Vec<Rgb> {
-            let row = |i: usize| {
-                let sum: f32 = (0..n).map(|j| weight(i, j)).sum();
-                let lamp = Rgb::splat(if i == 0 { 1.0 } else { 0.0 });
-                lamp + (0..n).map(|j| e[j] * (0.99 * weight(i, j) / sum)).sum::<Rgb>()
-            };
-            (0..n).map(row).collect()
+        let room = |lamp: f32| {
+            move |e: &[Rgb]| -> Vec<Rgb> {
+                let row = |i: usize| {
+                    let sum: f32 = (0..n).map(|j| weight(i, j)).sum();
+                    let lamp = Rgb::splat(if i == 0 { lamp } else { 0.0 });
+                    lamp + (0..n).map(|j| e[j] * (0.99 * weight(i, j) / sum)).sum::<Rgb>()
+                };
+                (0..n).map(row).collect()
+            }
         };
-        let (_, report) = solve(vec![Rgb::BLACK; n], Gain::of_norm(0.99), 1e-2, 1000, room);
+        let (_, report) = solve(vec![Rgb::BLACK; n], 1e-2, 1000, room(1.0), room(0.0));
         // Plain iteration gains a factor of 0.99 a step: ln(1e-4) / ln(0.99) ≈ 900 of them.
         assert!(report.converged && report.iterations < 40, "{report:?}");
     }
 
     #[test]
     fn a_room_that_absorbs_nothing_never_claims_a_bound() {
-        let white = gain(50, ring(1.0, 0.0));
-        assert!(white.largest.is_infinite(), "{white:?}");
-        let (_, report) = solve(vec![Rgb::BLACK; 50], white, 1e-3, 10, ring(1.0, 1.0));
-        assert!(!report.converged && report.bound.is_infinite());
+        let (_, report) = solve(vec![Rgb::BLACK; 50], 1e-3, 300, ring(1.0, 1.0), ring(1.0, 0.0));
+        assert!(!report.converged && report.bound > 10.0, "{report:?}");
     }
 }
