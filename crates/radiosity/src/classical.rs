@@ -170,7 +170,6 @@ impl<'a> Room<'a> {
             residual: shooting.unshot_flux().mean(),
             bound: bound * mean.mean(),
             converged: shooting.finished(config.tolerance),
-            ..Convergence::default()
         };
         let report = Report {
             convergence,

@@ -63,6 +63,27 @@ impl Sources {
         }
         values
     }
+
+    /// The transpose of [`Sources::spread`]: from a share of each slot to a share of each of `sites`.
+    pub(crate) fn collect(&self, mut slots: Vec<f64>, sites: usize) -> Vec<f64> {
+        let mut shares = vec![0.0; sites];
+        // The middle of an edge is younger than its ends.
+        for (slot, source) in self.0.iter().enumerate().rev() {
+            let share = slots[slot];
+            match source {
+                Source::Nothing => {}
+                Source::Site(i) => shares[*i as usize] += share,
+                Source::Near(near, weights) => {
+                    near.iter().zip(weights).for_each(|(&i, &w)| shares[i as usize] += share * f64::from(w));
+                }
+                Source::Between(a, b) => {
+                    slots[*a as usize] += 0.5 * share;
+                    slots[*b as usize] += 0.5 * share;
+                }
+            }
+        }
+        shares
+    }
 }
 
 /// Sites, and how every vertex draws on them.

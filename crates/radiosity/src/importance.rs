@@ -69,7 +69,7 @@ impl Importance {
             for node in 0..elements.nodes.len() as u32 {
                 let own = of_nodes[node as usize];
                 let all: u32 = of_node[index(node, side)].iter().sum();
-                for child in elements.nodes[node as usize].children().into_iter().flatten() {
+                for child in elements.nodes[node as usize].children() {
                     let enough = all as f32 >= FEW;
                     of_nodes[child as usize] = if enough { weight(of_node[index(child, side)]) } else { own };
                 }

@@ -9,6 +9,7 @@ use crate::element::{EdgeMarks, Elements, Side, VertexId, slot};
 use crate::field::Field;
 use crate::flags::{Flags, visible_weights};
 use crate::importance::Importance;
+use crate::influence;
 use crate::journal::Journal;
 use crate::reach::Reach;
 use crate::solve::{Config, Progress};
@@ -33,6 +34,8 @@ const FEW: u32 = 16;
 const DARK: f32 = 0.01;
 /// Elements (of h0² each) that the first mesh may have, about.
 const FIRST_ELEMENTS: f32 = 10_000.0;
+/// A round for fewer new sites than one in so many is not worth its while.
+const HARDLY: usize = 20;
 /// Rays that probe the middle of a leaf.
 const PROBE: u32 = 32;
 /// A gather ray starts this share of the way from its vertex into a facet: a vertex in the corner of a room lies on
@@ -60,6 +63,8 @@ pub(crate) struct Refiner<'a> {
     pub(crate) unresolved: Vec<VertexId>,
     /// What an error matters at each slot, (0, 1]; empty where all matters alike.
     weights: Vec<f32>,
+    /// What an error at each slot matters for all the light there is: see [`influence`].
+    influence: Vec<f32>,
     /// Longest edge of the first mesh, m.
     h0: f32,
     /// Shortest edge worth splitting to, m.
@@ -132,6 +137,7 @@ impl<'a> Refiner<'a> {
             groups: config.by_light.then(|| LightGroups::new(world)),
             unresolved: Vec::new(),
             weights: Vec::new(),
+            influence: Vec::new(),
             h0,
             h_min,
             radius,
@@ -157,15 +163,16 @@ impl<'a> Refiner<'a> {
     }
 
     /// Finds anew what matters, after the mesh was refined.
-    fn weigh(&mut self) {
+    pub(crate) fn weigh(&mut self) {
         if let Some(importance) = self.importance {
             self.weights = importance.weights(&self.elements);
         }
     }
 
-    /// What an error at a slot matters, (0, 1].
+    /// What an error at a slot matters: 1 where it is seen, less elsewhere, more where much of the light hangs on it.
     pub(crate) fn weight(&self, slot: usize) -> f32 {
-        self.weights.get(slot).copied().unwrap_or(1.0)
+        let seen = self.weights.get(slot).copied().unwrap_or(1.0);
+        seen.max(self.influence.get(slot).copied().unwrap_or(0.0))
     }
 
     /// Tests and refines until the tolerance, the finest edge, the sites, the rounds or the time run out.
@@ -185,6 +192,10 @@ impl<'a> Refiner<'a> {
             edges.sort_unstable();
             edges.dedup();
             let left = self.config.most_sites.saturating_sub(self.field.sites.len());
+            // Too few to change anything, and a round costs as much as any.
+            if round > 0 && left * HARDLY < self.field.sites.len() {
+                break;
+            }
             // The first rounds may not use up what later ones need to go deep.
             let room = if round + 1 < self.config.rounds { left / 2 } else { left };
             let (chosen, kept, members) = self.choose(&edges, clusters.furthest(self, &open), room);
@@ -223,6 +234,7 @@ impl<'a> Refiner<'a> {
             edges.dedup();
             open = clusters.divide(self, &members, &failed);
         }
+        self.reveal();
         self.unresolved = (0..rough.len() as VertexId).filter(|&v| rough[v as usize]).collect();
     }
 
@@ -402,6 +414,11 @@ impl<'a> Refiner<'a> {
         let midpoints = marks.split_edges();
         for &(a, b, m) in &midpoints {
             self.field.put_between(m, [a, b]);
+            for side in Side::BOTH {
+                let ends = [a, b].map(|v| self.influence.get(slot(v, side)).copied().unwrap_or(0.0));
+                self.influence.resize(slot(m, side), 0.0);
+                self.influence.push(ends[0].max(ends[1]));
+            }
         }
         let test = |&(a, b, m): &(VertexId, VertexId, VertexId)| Test {
             vertex: m,
@@ -462,9 +479,11 @@ impl<'a> Refiner<'a> {
     }
 
     /// Solves on what there is, roughly: for predictions, not for pictures.
-    fn settle(&mut self) {
+    pub(crate) fn settle(&mut self) {
         let tolerance = 0.02 * mean(&self.e).mean();
-        let settled = self.solved(tolerance, 12, &[], &[], &Flags::default());
+        let transport = self.transport(&Flags::default());
+        let settled = self.solved(&transport, tolerance, 12, &[], &[], &Flags::default());
+        self.influence = influence::of_slots(self, &transport, &settled.e);
         self.e = settled.e;
         self.field.sites.iter_mut().zip(settled.variance).for_each(|(site, v)| site.variance = v);
     }
@@ -474,13 +493,13 @@ impl<'a> Refiner<'a> {
     /// - `extra_parts`: the parts of the groups of lights in `extra`; empty as that is.
     pub(crate) fn solved(
         &self,
+        transport: &Transport,
         tolerance: f32,
         most: u32,
         extra: &[Rgb],
         extra_parts: &[Vec<Rgb>],
         flags: &Flags,
     ) -> Solved {
-        let transport = self.transport(flags);
         let norm = transport.norm();
         let reflect = |e: &[Rgb]| transport.reflect(e, &[]);
         let apply = |e: &[Rgb]| transport.apply(e, extra);
@@ -506,7 +525,7 @@ impl<'a> Refiner<'a> {
     }
 
     /// The rows over the present mesh.
-    fn transport(&self, flags: &Flags) -> Transport<'_> {
+    pub(crate) fn transport(&self, flags: &Flags) -> Transport<'_> {
         let usable = |s: usize| self.field.usable(s);
         let (world, elements) = (self.world, &self.elements);
         Transport::locate(elements, &self.field, |node, side, w| {

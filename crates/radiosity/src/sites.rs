@@ -66,7 +66,7 @@ impl Refiner<'_> {
     fn rays_for(&self, slot: usize) -> u32 {
         const LEAST: u32 = 32;
         let all = self.config.rays;
-        ((all as f32 * self.weight(slot)) as u32).next_multiple_of(16).max(LEAST.min(all))
+        ((all as f32 * self.weight(slot).min(1.0)) as u32).next_multiple_of(16).max(LEAST.min(all))
     }
 
     /// Rows of as many rays as `rays` says for a slot, fewer where landings would take more memory than they may.

@@ -16,7 +16,7 @@
 
 use crate::bytes::{Plain, Reader, get_sources, put_all, put_sources};
 use crate::caustic::Caustics;
-use crate::element::{Elements, Node, Vertex, VertexId};
+use crate::element::{Elements, MIDDLE, Node, Vertex, VertexId};
 use crate::field::{Source, Sources};
 use crate::flags::Flags;
 use crate::lights::{Lights, RelightError};
@@ -240,8 +240,9 @@ fn get_elements(from: &mut Reader, triangles: usize) -> Option<Elements> {
     let sound = |(i, node): (usize, &Node)| {
         let corner = |v: VertexId| (v as usize) < vertices.len() || (v == VertexId::MAX && i < triangles);
         // Children come after their parents, so that no way down has no end.
-        let down = node.child == 0 || (node.child as usize > i && (node.child as usize + 1) < nodes.len());
-        node.vertices.iter().all(|&v| corner(v)) && down && node.edge < 3
+        let down =
+            node.child == 0 || (node.child as usize > i && node.children().end as usize <= nodes.len());
+        node.vertices.iter().all(|&v| corner(v)) && down && node.edge <= MIDDLE
     };
     let whole =
         nodes.par_iter().enumerate().all(sound) && roots as usize == triangles && nodes.len() >= triangles;

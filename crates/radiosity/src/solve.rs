@@ -172,7 +172,7 @@ pub fn solve_resumable(
     let flags = refiner.flags();
     let tolerance = config.solve_tolerance * mean(&refiner.e).mean();
     let Solved { e, parts, variance, convergence, norm } =
-        refiner.solved(tolerance, 500, &extra, &extra_parts, &flags);
+        refiner.solved(&refiner.transport(&flags), tolerance, 500, &extra, &extra_parts, &flags);
     if !e.iter().all(|e| e.is_finite()) {
         return Err(Error::Diverged { iterations: convergence.iterations, norm });
     }

@@ -1,21 +1,25 @@
-//! The forest of bisected triangles: split edges, find the leaf under a point.
+//! The forest of split triangles: split edges and middles, find the leaf under a point.
 
 use super::weld::weld;
 use super::{Vertex, VertexId};
 use geometry::{Mesh, Vec3};
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
+use std::ops::Range;
 
 /// A triangle of the element mesh; a leaf until it is split.
 #[derive(Clone, Copy, Debug)]
 pub struct Node {
     /// Its corners.
     pub vertices: [VertexId; 3],
-    /// First of its two children; 0 for a leaf (node 0 is a root, never a child).
+    /// First of its children; 0 for a leaf (node 0 is a root, never a child).
     pub(crate) child: u32,
-    /// The edge from corner `edge` to the next one is the one that was split.
+    /// The edge from corner `edge` to the next one is the one that was split; or [`MIDDLE`].
     pub(crate) edge: u8,
 }
+
+/// In place of an edge: the node was split in three, at its middle.
+pub(crate) const MIDDLE: u8 = 3;
 
 impl Node {
     /// Whether it was not split.
@@ -23,9 +27,14 @@ impl Node {
         self.child == 0
     }
 
-    /// Its two children, unless it is a leaf.
-    pub fn children(&self) -> Option<[u32; 2]> {
-        (!self.is_leaf()).then_some([self.child, self.child + 1])
+    /// Its children: two or three, none for a leaf.
+    pub fn children(&self) -> Range<u32> {
+        let count = match (self.is_leaf(), self.edge) {
+            (true, _) => 0,
+            (false, MIDDLE) => 3,
+            (false, _) => 2,
+        };
+        self.child..self.child.saturating_add(count)
     }
 }
 
@@ -163,6 +172,15 @@ impl Elements {
                     visit(at, root, uv);
                     continue;
                 }
+                if node.edge == MIDDLE {
+                    let m = [0, 1].map(|k| (uv[0][k] + uv[1][k] + uv[2][k]) / 3.0);
+                    open.extend((0..3).map(|k| {
+                        let mut corners = uv;
+                        corners[k] = m;
+                        (node.child + k as u32, corners)
+                    }));
+                    continue;
+                }
                 let e = node.edge as usize;
                 let (p, q, r) = (uv[e], uv[(e + 1) % 3], uv[(e + 2) % 3]);
                 let m = [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])];
@@ -212,6 +230,15 @@ impl Elements {
             if node.is_leaf() {
                 return (at, w);
             }
+            if node.edge == MIDDLE {
+                // Child k has the middle in place of corner k, of which its points have least.
+                let k = if w[0] <= w[1] && w[0] <= w[2] { 0 } else { 2 - usize::from(w[1] <= w[2]) };
+                let least = w[k];
+                w = w.map(|w| w - least);
+                w[k] = 3.0 * least;
+                at = node.child + k as u32;
+                continue;
+            }
             // Corners p → q of the split edge, r opposite. Children: (p, m, r) and (m, q, r); with m = (p + q)/2 a
             // point's weights on p and q become |w_p − w_q| on the nearer one and 2 min on m.
             let e = node.edge as usize;
@@ -250,6 +277,25 @@ impl Elements {
             (node.child, node.edge) = (child, e as u8);
             open.extend([child, child + 1]);
         }
+    }
+
+    /// Splits a leaf in three at its middle, which becomes a vertex; no other leaf takes notice.
+    pub fn split_at_middle(&mut self, leaf: u32) -> VertexId {
+        let corners = self.nodes[leaf as usize].vertices;
+        let [a, b, c] = corners.map(|v| self.vertices[v as usize]);
+        let middle = self.vertices.len() as VertexId;
+        let normal = (a.normal + b.normal + c.normal).normalize_or(a.normal);
+        let position = (a.position + b.position + c.position) / 3.0;
+        self.vertices.push(Vertex { position, normal, ..a });
+        let child = self.nodes.len() as u32;
+        for k in 0..3 {
+            let mut vertices = corners;
+            vertices[k] = middle;
+            self.nodes.push(Node { vertices, child: 0, edge: 0 });
+        }
+        let node = &mut self.nodes[leaf as usize];
+        (node.child, node.edge) = (child, MIDDLE);
+        middle
     }
 
     fn midpoint(&mut self, p: VertexId, q: VertexId, marks: &mut EdgeMarks) -> VertexId {
@@ -306,6 +352,10 @@ mod tests {
     fn location_and_position_agree_after_splitting() {
         let mesh = square();
         let mut elements = Elements::new(&mesh);
+        elements.split_longer_than(0.4, 100_000);
+        elements.leaves().step_by(2).collect::<Vec<_>>().into_iter().for_each(|leaf| {
+            elements.split_at_middle(leaf);
+        });
         elements.split_longer_than(0.2, 100_000);
         for (t, u, v) in [(0, 0.3, 0.4), (1, 0.01, 0.98), (0, 0.0, 0.0), (1, 0.33, 0.33)] {
             let (leaf, w) = elements.locate(t, u, v);
@@ -313,8 +363,19 @@ mod tests {
             let p = a * w[0] + b * w[1] + c * w[2];
             let want = mesh.interpolate(t, u, v, &mesh.positions);
             assert!(p.distance(want) < 1e-6, "{p} {want}");
-            assert!(w.iter().all(|&x| x >= 0.0));
+            assert!(w.iter().all(|&x| x >= 0.0) && (w.iter().sum::<f32>() - 1.0).abs() < 1e-5);
         }
+        // The other way about: the leaves' corners are where the scene's triangles have them.
+        let mut area = 0.0;
+        elements.visit_leaf_corners(2, |leaf, t, uv| {
+            let corners = elements.corners(leaf);
+            area += geometry::triangle::area(corners[0], corners[1], corners[2]);
+            for (corner, [u, v]) in corners.into_iter().zip(uv) {
+                let want = mesh.interpolate(t, u, v, &mesh.positions);
+                assert!(corner.distance(want) < 1e-6, "{corner} {want}");
+            }
+        });
+        assert!((area - 1.0).abs() < 1e-5, "{area}");
     }
 
     #[test]

@@ -1,12 +1,13 @@
-//! Triangles to elements and vertices: a forest of bisections over the scene's triangles.
+//! Triangles to elements and vertices: a forest over the scene's triangles.
 //!
-//! Every scene triangle is the root of a binary tree; a node is split at the midpoint of one of its edges. An edge
-//! is split for all triangles that share it, so the leaves meet without cracks or hanging vertices.
+//! Every scene triangle is the root of a tree; a node is split at the midpoint of one of its edges, or in three at its
+//! middle. An edge is split for all triangles that share it, so the leaves meet without cracks or hanging vertices.
 
 pub mod cluster;
 mod forest;
 mod weld;
 
+pub(crate) use forest::MIDDLE;
 pub use forest::{EdgeMarks, Elements, Node};
 
 use geometry::Vec3;
