@@ -65,7 +65,8 @@ fn load_lit(path: &Path, which: &WhichArgs, light: &LightArgs) -> Result<Loaded>
     let names = loaded.scene.light_names();
     for (name, factor) in &light.lights {
         if !names.contains(name) {
-            let message = format!("there is no light {name:?}; the file has {}", names.join(", "));
+            let known = if names.is_empty() { "none".into() } else { names.join(", ") };
+            let message = format!("there is no light {name:?}; the file has {known}");
             return Err(AskedWrongly(message).into());
         }
         loaded.scene.scale_lights(name, *factor);

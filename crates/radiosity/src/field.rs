@@ -232,3 +232,25 @@ fn sees(world: &World, a: &Vertex, b: &Vertex, side: Side) -> bool {
     let ray = Ray { t_max: length, ..Ray::new(from, (to - from) / length) };
     !world.bvh.occluded(&ray)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn collecting_is_the_transpose_of_spreading() {
+        let sources = Sources(vec![
+            Source::Site(1),
+            Source::Nothing,
+            Source::Near([0, 2, 0, 0], [0.25, 0.75, 0.0, 0.0]),
+            Source::Site(0),
+            Source::Between(0, 2),
+            Source::Between(4, 3),
+        ]);
+        let (e, shares) = ([1.0, 10.0, 100.0], [1.0, 2.0, 3.0, 5.0, 7.0, 11.0f64]);
+        let spread = sources.spread(&e.map(Rgb::splat));
+        let there: f64 = spread.iter().zip(shares).map(|(v, share)| f64::from(v.g) * share).sum();
+        let back: f64 = sources.collect(shares.into(), 3).iter().zip(e).map(|(s, e)| s * f64::from(e)).sum();
+        assert!((there - back).abs() < 1e-4 * there, "{there} {back}");
+    }
+}

@@ -40,6 +40,8 @@ pub fn check_writable(path: &Path) -> Result<(), Error> {
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.into());
     match fs::metadata(&target) {
         Ok(m) if !m.is_file() => Ok(()),
+        // A name that is too long, say, or a folder on the way that may not be entered.
+        Err(e) if e.kind() != io::ErrorKind::NotFound && folder(&target).is_dir() => Err(fail(e)),
         _ if !folder(&target).is_dir() => Err(fail(io::Error::new(
             io::ErrorKind::NotFound,
             format!("the folder {} does not exist", folder(&target).display()),
@@ -97,6 +99,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         assert!(check_writable(&dir.path().join("fine.exr")).is_ok());
         assert!(check_writable(dir.path()).is_err());
+        assert!(check_writable(&dir.path().join("long".repeat(100))).is_err());
         let absent = check_writable(&dir.path().join("no/such/folder.exr")).unwrap_err();
         let Error::Write { source, .. } = absent else { panic!("{absent}") };
         assert!(source.to_string().contains("does not exist"), "{source}");

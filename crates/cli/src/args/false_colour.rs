@@ -2,6 +2,7 @@
 
 use crate::values;
 use clap::{Args, ValueEnum};
+use serde::Serialize;
 use std::path::PathBuf;
 
 /// Arguments of `false-colour`.
@@ -22,6 +23,9 @@ pub struct FalseColourCommand {
     pub layer: Option<String>,
     #[command(flatten)]
     pub colours: FalseColourArgs,
+    /// Print the values' statistics and the scale as JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Scale and lines of a false-colour picture.
@@ -39,7 +43,8 @@ pub struct FalseColourArgs {
 }
 
 /// `--scale`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
 pub enum ScaleArg {
     /// From 0
     Linear,
