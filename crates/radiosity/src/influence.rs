@@ -10,9 +10,9 @@ use geometry::Rgb;
 /// Bounces by which light is followed back.
 const BOUNCES: usize = 4;
 /// What an error matters at a site on which as much light hangs as on the mean one, where 1 is that of one that is seen.
-/// With 1 the gallery takes 30 s for the error that it has after 15 s with this; white walls of 400 000 triangles gain a
-/// hundredth of their light by it.
-const MEAN: f32 = 0.3;
+/// With 1 the gallery takes twice the time for the same error, and white walls among 400 000 triangles come to 0.94 of their
+/// indirect light; to 0.92 with this, in no more time than without, when they come to 0.90.
+const MEAN: f32 = 0.1;
 /// An error matters no more than so many times that of a site that is seen.
 const MOST: f32 = 3.0;
 
