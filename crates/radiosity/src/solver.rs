@@ -21,7 +21,8 @@ pub struct Convergence {
     pub iterations: u32,
     /// Largest |D + K E − E| over sites and channels, lx.
     pub residual: f32,
-    /// Values are on average no further than this from the fixed point, lx: see [`outstanding`].
+    /// Values are on average no further than this from the fixed point, lx: what the residual would bring yet at all later
+    /// bounces.
     pub bound: f32,
     /// Whether the bound asked for was met.
     pub converged: bool,

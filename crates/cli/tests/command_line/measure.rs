@@ -195,7 +195,7 @@ fn a_picture_in_false_colour_has_the_colours_of_its_scale() {
         dir.path(),
         &["false-colour", "a.exr", "-o", "a.png", "--max", "50", "--isolines", "10,20", "--json"],
     );
-    let told: serde_json::Value = serde_json::from_str(&run.out).expect("it is JSON");
+    let told: Value = serde_json::from_str(&run.out).expect("it is JSON");
     assert_eq!((&told["values"]["min"], &told["values"]["max"]), (&0.0.into(), &63.0.into()), "{told}");
     assert!((told["values"]["mean"].as_f64().unwrap() - 31.5).abs() < 1e-3, "{told}");
     assert_eq!((&told["scale"], &told["scale_max"]), (&"linear".into(), &50.0.into()), "{told}");
