@@ -54,6 +54,32 @@ fn a_slab_of_glass_reflects_and_passes_its_share() {
     }
 }
 
+/// A liquid of index 1.33 that reaches into a plate of index 1.5: three boundaries are there, of the four modelled. In
+/// series, all orders between them, R / (1 − R) = Σ r / (1 − r).
+#[test]
+fn a_liquid_on_glass_has_one_boundary_with_it() {
+    let (plate, liquid) = (glass(1.5, Some(CLEAR)), glass(1.33, Some(CLEAR)));
+    let block = |build: Build, low: f32, high: f32, material: &Material| {
+        build.solid(Vec3::new(-3.0, -3.0, low), Vec3::new(3.0, 3.0, high), material)
+    };
+    let build = block(block(Build::new(), -0.1, 0.0, &plate), -0.2, -0.09, &liquid);
+    let corners = [[-4.0, -4.0], [4.0, -4.0], [4.0, 4.0], [-4.0, 4.0]].map(|[x, y]| Vec3::new(x, y, -0.5));
+    let world = build.quad(corners, &lamp(100.0)).world();
+    let r = |a: f64, b: f64| ((a - b) / (a + b)).powi(2);
+    let odds: f64 = [r(1.0, 1.5), r(1.5, 1.33), r(1.33, 1.0)].iter().map(|r| r / (1.0 - r)).sum();
+    let eye = parallel(Vec3::Z, Vec3::ZERO, 0.05, 0.0);
+    assert_both("glass over liquid", &world, &eye, 100.0 / (1.0 + odds), 1e-3);
+}
+
+/// A ball that bends every colour by another angle, under an even sky of which it hides nothing.
+#[test]
+fn a_dispersive_ball_vanishes_under_an_even_sky() {
+    let flint = Material { dispersion: 1.0, ..glass(1.8, Some(CLEAR)) };
+    let world = Build::new().ball(Vec3::ZERO, 0.5, 4, false, |_| flint.clone()).sky(10.0).world();
+    let eye = camera(Vec3::Z * 3.0, Vec3::ZERO, 0.3);
+    assert_both("prism", &world, &eye, 10.0, 1e-2);
+}
+
 /// Glass of index 1 bends and reflects nothing: the picture is the one without it.
 #[test]
 fn glass_of_index_one_is_invisible() {

@@ -69,6 +69,14 @@ impl Build {
         self
     }
 
+    /// A block whose six faces bound one solid of `material`.
+    pub fn solid(self, lo: Vec3, hi: Vec3, material: &Material) -> Build {
+        let first = self.scene.materials.len() as u32;
+        let mut build = self.block(lo, hi, material);
+        build.scene.mesh.materials.iter_mut().for_each(|m| m.0 = m.0.min(first));
+        build
+    }
+
     /// A plane quadrilateral as a grid of `n` × `n` cells, each of two triangles.
     pub fn grid(self, [a, b, c, d]: [Vec3; 4], n: usize, material: &Material) -> Build {
         let normal = (b - a).cross(d - a).normalize();

@@ -70,6 +70,10 @@ pub struct Material {
     pub transmission_texture: Option<TextureRef>,
     /// Present when the surface bounds a volume and refracts; absent for a thin wall.
     pub volume: Option<Volume>,
+    /// 20 over the Abbe number of the volume, ≥ 0; 0 for one that bends all colours alike (KHR_materials_dispersion).
+    pub dispersion: f32,
+    /// Where volumes overlap, that of the highest priority is there; of several the one of the highest index.
+    pub priority: i32,
     /// Replaces the roughness by 1 − this · alpha of `specular_color_texture` (KHR_materials_pbrSpecularGlossiness).
     pub glossiness: Option<f32>,
     /// Diffuse light that comes through.
@@ -110,6 +114,8 @@ impl Default for Material {
             transmission: 0.0,
             transmission_texture: None,
             volume: None,
+            dispersion: 0.0,
+            priority: 0,
             glossiness: None,
             diffuse_transmission: None,
             anisotropy: None,

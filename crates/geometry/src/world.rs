@@ -2,10 +2,11 @@
 
 use crate::emitter::Emitters;
 use crate::math::{Vec3, offset_origin, to_world};
+use crate::nesting::Nesting;
 use crate::optics::attenuation;
 use crate::sampling::{self, Rng};
 use crate::surface::straight_through;
-use crate::{Bvh, Hit, Mesh, Ray, Rgb, Scene, Volume};
+use crate::{Bvh, Hit, Mesh, Ray, Rgb, Scene, Surface, Volume};
 
 /// Shadow rays give up, as if blocked, after so many panes.
 const MAX_LAYERS: usize = 64;
@@ -28,6 +29,8 @@ pub struct World {
     pub bounds: (Vec3, Vec3),
     /// Search tree over the triangles whose material may let light straight through, where there are any.
     see_through: Option<Bvh>,
+    /// What lies within what, where solids overlap.
+    nesting: Option<Nesting>,
 }
 
 impl World {
@@ -39,7 +42,8 @@ impl World {
         let see_through = see_through(&scene).map(|mesh| Bvh::build(&mesh));
         let diagonal = (bounds.1 - bounds.0).length();
         let scale = room_size(&scene.mesh, &bvh, diagonal);
-        World { bvh, emitters, diagonal, scale, bounds, see_through, scene }
+        let nesting = Nesting::new(&scene);
+        World { bvh, emitters, diagonal, scale, bounds, see_through, nesting, scene }
     }
 
     /// Gathers anew what shines, after the scene's emissions were changed, and nothing else of it.
@@ -50,6 +54,12 @@ impl World {
     /// The nearest triangle the ray meets.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         self.bvh.closest_hit(ray)
+    }
+
+    /// The surface that `ray` met at `hit`, with what lies on its two sides.
+    pub fn surface(&self, ray: &Ray, hit: &Hit) -> Surface {
+        let sides = self.nesting.as_ref().and_then(|n| n.sides(&self.scene, ray, hit));
+        Surface::between(&self.scene, ray, hit, sides)
     }
 
     /// Share of the light that comes straight along the ray, [0, 1] in each channel: 1 with nothing between, less

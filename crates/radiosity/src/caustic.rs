@@ -10,7 +10,7 @@ use crate::gather::ROUGH;
 use geometry::bsdf::Transport;
 use geometry::math::offset_origin;
 use geometry::sampling::Rng;
-use geometry::{LightGroups, Mesh, Ray, Rgb, Surface, Vec3, World, optics};
+use geometry::{LightGroups, Mesh, Passage, Ray, Rgb, Vec3, World};
 use rayon::prelude::*;
 
 /// Photons that one estimate of irradiance uses.
@@ -320,15 +320,14 @@ fn send(
     let mut ray = start.ray;
     let mut specular = 0;
     let mut rough_first = false;
+    let mut passage = Passage::default();
     for _ in 0..LONGEST {
         let Some(hit) = world.bvh.closest_hit(&ray) else { return };
-        let mut surface = Surface::new(&world.scene, &ray, &hit);
+        let mut surface = world.surface(&ray, &hit);
+        flux *= passage.meet(&mut surface, hit.t - ray.t_min, rng);
         surface.bsdf = surface.bsdf.with_transport(Transport::Importance);
-        if let Some(volume) = surface.interior() {
-            flux *= optics::attenuation(volume.attenuation_color, volume.attenuation_distance, hit.t);
-        }
         if surface.coverage < 1.0 && rng.f32() >= surface.coverage {
-            ray = Ray::new(offset_origin(surface.position, -surface.ng), ray.direction);
+            ray.t_min = hit.t;
             continue;
         }
         if surface.unlit.is_some() || !flux.is_finite() {
@@ -359,6 +358,7 @@ fn send(
             specular += 1;
             rough_first = specular == 1 && surface.bsdf.glossy_roughness() >= ROUGH;
         }
+        flux *= passage.leave(&surface, next.wi);
         let away = if next.wi.dot(surface.ng) > 0.0 { surface.ng } else { -surface.ng };
         ray = Ray::new(offset_origin(surface.position, away), next.wi);
     }

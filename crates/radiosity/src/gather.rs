@@ -11,7 +11,7 @@ use crate::element::Side;
 use crate::transport::{Landing, Row};
 use geometry::math::{offset_origin, to_world};
 use geometry::sampling::{Lattice2, Rng, cosine_hemisphere};
-use geometry::{Hit, LightGroups, Ray, Rgb, Surface, Vec3, World, optics};
+use geometry::{Hit, LightGroups, Passage, Ray, Rgb, Surface, Vec3, World};
 use std::f32::consts::PI;
 
 /// From this GGX width (α = roughness²) up, a lobe is rough enough to sample lamps through it.
@@ -48,6 +48,7 @@ pub fn follow(
     let mut out = Followed { distance: f32::INFINITY, ..Followed::default() };
     let mut throughput = Rgb::WHITE;
     let (mut specular, mut rough_first) = (0, false);
+    let mut passage = Passage::default();
     for _ in 0..LONGEST {
         let is_the_photons = specular > 1 || (specular == 1 && !rough_first);
         let Some(hit) = world.bvh.closest_hit(&ray) else {
@@ -56,16 +57,14 @@ pub fn follow(
             }
             return out;
         };
-        let surface = Surface::new(&world.scene, &ray, &hit);
-        if out.first.is_none() {
+        let mut surface = world.surface(&ray, &hit);
+        if out.first.is_none() && surface.coverage > 0.0 {
             out.distance = hit.t;
             out.first = Some((hit.triangle, Side::met(surface.front)));
         }
-        if let Some(volume) = surface.interior() {
-            throughput *= optics::attenuation(volume.attenuation_color, volume.attenuation_distance, hit.t);
-        }
+        throughput *= passage.meet(&mut surface, hit.t - ray.t_min, rng);
         if surface.coverage < 1.0 && rng.f32() >= surface.coverage {
-            ray = Ray::new(offset_origin(surface.position, -surface.ng), ray.direction);
+            ray.t_min = hit.t;
             continue;
         }
         if surface.unlit.is_some() {
@@ -121,6 +120,7 @@ pub fn follow(
             }
             throughput *= 0.1 / survive;
         }
+        throughput *= passage.leave(&surface, next.wi);
         let away = if next.wi.dot(surface.ng) > 0.0 { surface.ng } else { -surface.ng };
         ray = Ray::new(offset_origin(surface.position, away), next.wi);
     }

@@ -8,7 +8,7 @@
 use crate::element::{Elements, Side};
 use geometry::math::{offset_origin, to_world};
 use geometry::sampling::{self, Rng};
-use geometry::{Mesh, Ray, Surface, Vec3, World};
+use geometry::{Mesh, Ray, Vec3, World};
 use rayon::prelude::*;
 
 /// Walks from each side of everything that is asked for, beside those shared.
@@ -137,7 +137,7 @@ fn walk(world: &World, p: Vec3, n: Vec3, rng: &mut Rng) -> bool {
     let mut ray = Ray::new(offset_origin(p, n), to_world(sampling::cosine_hemisphere(rng.vec2()), n));
     for _ in 0..LONGEST {
         let Some(hit) = world.bvh.closest_hit(&ray) else { return world.scene.sky.is_some() };
-        let surface = Surface::new(&world.scene, &ray, &hit);
+        let surface = world.surface(&ray, &hit);
         if !surface.emission.is_black() {
             return true;
         }

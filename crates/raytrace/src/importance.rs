@@ -2,7 +2,7 @@
 
 use geometry::math::{offset_origin, to_world};
 use geometry::sampling::{Rng, cosine_hemisphere};
-use geometry::{Camera, Ray, Surface, World};
+use geometry::{Camera, Ray, World};
 use radiosity::element::Side;
 use radiosity::importance::{Importance, Point};
 use rayon::prelude::*;
@@ -39,9 +39,9 @@ pub fn importance(world: &World, cameras: &[Camera], aspect: f32) -> Importance 
 fn follow(world: &World, mut ray: Ray, seen: bool, rng: &mut Rng, points: &mut Vec<Point>) {
     for _ in 0..LONGEST {
         let Some(hit) = world.closest(&ray) else { return };
-        let surface = Surface::new(&world.scene, &ray, &hit);
+        let surface = world.surface(&ray, &hit);
         if surface.coverage < 1.0 && rng.f32() >= surface.coverage {
-            ray = Ray::new(offset_origin(surface.position, -surface.ng), ray.direction);
+            ray.t_min = hit.t;
             continue;
         }
         if surface.unlit.is_some() {

@@ -179,7 +179,7 @@ fn phase(x: u32, y: u32, seed: u64) -> u32 {
 fn first_surface(world: &World, mut ray: Ray) -> Option<(Ray, Surface)> {
     for _ in 0..64 {
         let hit = world.closest(&ray)?;
-        let surface = Surface::new(&world.scene, &ray, &hit);
+        let surface = world.surface(&ray, &hit);
         if surface.coverage > 0.0 {
             return Some((ray, surface));
         }

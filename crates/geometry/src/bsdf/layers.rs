@@ -111,6 +111,14 @@ impl Layers {
         }
     }
 
+    /// Refracts by another index, `eta` = n on wo's side over n on the other, where it refracts at all.
+    pub fn refract_by(&mut self, eta: f32) {
+        if self.solid > 0.0 && self.eta != 1.0 {
+            self.eta = eta;
+            self.spread = self.spread.map(|_| Spread::new(self.alpha, eta, false));
+        }
+    }
+
     /// GGX width; 0 for perfect lobes.
     pub fn alpha(&self) -> f32 {
         self.alpha

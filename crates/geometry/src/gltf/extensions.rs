@@ -6,7 +6,7 @@ use super::error::Error;
 use super::warnings::Warnings;
 
 /// Modelled, wherever the file uses them.
-const MODELLED: [&str; 21] = [
+const MODELLED: [&str; 22] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
@@ -15,6 +15,7 @@ const MODELLED: [&str; 21] = [
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
     "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_iridescence",
@@ -31,8 +32,7 @@ const MODELLED: [&str; 21] = [
 ];
 
 /// Not modelled, but the file still shows the right shapes; where a material uses one, it says so there.
-const TOLERATED: [&str; 4] =
-    ["KHR_animation_pointer", "KHR_materials_dispersion", "KHR_xmp", "KHR_xmp_json_ld"];
+const TOLERATED: [&str; 3] = ["KHR_animation_pointer", "KHR_xmp", "KHR_xmp_json_ld"];
 
 /// Refuses a file that requires what would make it come out wrong, and warns of the rest.
 pub(super) fn check(

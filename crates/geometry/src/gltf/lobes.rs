@@ -20,6 +20,7 @@ impl Reader<'_> {
                 "KHR_materials_anisotropy" => m.anisotropy = self.anisotropy(&e)?,
                 "KHR_materials_iridescence" => m.iridescence = self.iridescence(&e)?,
                 "KHR_materials_diffuse_transmission" => m.diffuse_transmission = self.translucency(&e)?,
+                "KHR_materials_dispersion" => m.dispersion = self.dispersion(&e)?,
                 "KHR_materials_pbrSpecularGlossiness" => self.specular_glossiness(m, &e)?,
                 _ => {}
             }
@@ -84,6 +85,14 @@ impl Reader<'_> {
             thickness_texture: self.map(e, "iridescenceThicknessTexture")?,
         };
         Ok((film.share > 0.0).then_some(film))
+    }
+
+    /// 20 over the Abbe number, ≥ 0.
+    fn dispersion(&mut self, e: &Extension) -> Result<f32, Error> {
+        let Some(v) = e.value.get("dispersion") else { return Ok(0.0) };
+        let at = format!("{}.dispersion", e.at);
+        let v = self.number(&at, v)?;
+        self.at_least(&at, v, 0.0)
     }
 
     fn translucency(&mut self, e: &Extension) -> Result<Option<DiffuseTransmission>, Error> {

@@ -106,6 +106,7 @@ impl Reader<'_> {
             }
             Checked::Invalid => return Err(self.fault("alphaMode", "?", "must be OPAQUE, MASK or BLEND")),
         };
+        m.priority = self.priority(json)?;
         if let Some(extensions) = &json.extensions {
             self.extend(&mut m, extensions)?;
         }
@@ -147,6 +148,15 @@ impl Reader<'_> {
         }
         self.warn_of_others(&m.name, &e.others);
         Ok(())
+    }
+
+    /// `extras.priority`, which says what is there where volumes overlap: glTF has no word of its own for it. Extras are
+    /// anybody's, so that what is no object says nothing.
+    fn priority(&self, json: &json::Material) -> Result<i32, Error> {
+        let extras = json.extras.as_ref().and_then(|e| json::deserialize::from_str::<Value>(e.get()).ok());
+        let Some(priority) = extras.as_ref().and_then(|e| e.get("priority")) else { return Ok(0) };
+        let number = priority.as_i64().and_then(|n| i32::try_from(n).ok());
+        number.ok_or_else(|| self.fault("extras.priority", priority, "not an integer"))
     }
 
     /// None for a thickness of 0, which means a thin wall. Otherwise the mesh itself says how thick it is.

@@ -10,7 +10,9 @@ mod tests;
 pub use lookup::{base_color_at, coverage_at, emission_at, straight_through};
 
 use crate::bsdf::{Bsdf, Shading};
+use crate::dispersion::{Hue, Index};
 use crate::math::Vec3;
+use crate::nesting::Sides;
 use crate::{Hit, MaterialId, Ray, Rgb, Scene, Volume};
 use lookup::Point;
 
@@ -43,21 +45,45 @@ pub struct Surface {
     pub unlit: Option<Rgb>,
     /// Reflection and transmission; nothing for an unlit material.
     pub bsdf: Bsdf,
-    /// What the material encloses, when it transmits light and bounds a volume.
-    pub volume: Option<Volume>,
+    /// What the ray travelled through on its way here, as far as this surface tells; `None` for air.
+    pub before: Option<Volume>,
+    /// What lies beyond the surface.
+    pub beyond: Option<Volume>,
+    /// What refracts before and beyond, where one of them bends colours by different angles.
+    pub indices: Option<[Index; 2]>,
 }
 
 impl Surface {
-    /// The surface of `scene` that `ray` met at `hit`.
+    /// The surface of `scene` that `ray` met at `hit`, with air around the solid that it bounds:
+    /// [`World::surface`](crate::World::surface) knows of others.
     pub fn new(scene: &Scene, ray: &Ray, hit: &Hit) -> Surface {
+        Surface::between(scene, ray, hit, None)
+    }
+
+    /// The same where it is known what lies before and beyond. A boundary with the same on both sides is not there: it
+    /// covers nothing.
+    pub fn between(scene: &Scene, ray: &Ray, hit: &Hit, sides: Option<Sides>) -> Surface {
         let point = Point::new(scene, hit.triangle, hit.u, hit.v);
         let material = point.material;
         let normals = point.normals(-ray.direction);
         let (base_color, alpha) = point.base_color();
-        let shading = match material.unlit {
+        let mut shading = match material.unlit {
             true => lookup::NOTHING,
             false => point.with_lobes(point.shading(base_color), &normals),
         };
+        let here = scene.mesh.materials[hit.triangle as usize];
+        let solid = material.enclosed().map(|_| here);
+        let alone = if normals.front { [None, solid] } else { [solid, None] };
+        let sides = sides.filter(|_| solid.is_some()).unwrap_or(alone);
+        let of = |side: Option<MaterialId>| side.map(|m| &scene.materials[m.0 as usize]);
+        let index = |m: &crate::Material| Index { ior: m.ior, dispersion: m.dispersion };
+        let indices = sides.map(|side| of(side).map_or(Index::AIR, index));
+        if sides != alone && material.ior > 0.0 {
+            let [before, beyond] = indices.map(|i| i.ior);
+            // The index of the inside over that of the outside.
+            shading.ior = if normals.front { beyond / before } else { before / beyond };
+        }
+        let disperses = solid.is_some() && indices.iter().any(|i| i.dispersion > 0.0);
         Surface {
             position: point.position(),
             triangle: hit.triangle,
@@ -67,12 +93,14 @@ impl Surface {
             ng: normals.geometric,
             ns: normals.shading,
             smooth: normals.smooth,
-            material: scene.mesh.materials[hit.triangle as usize],
-            coverage: point.coverage(alpha),
+            material: here,
+            coverage: if solid.is_some() && sides[0] == sides[1] { 0.0 } else { point.coverage(alpha) },
             emission: point.emission(normals.front),
             unlit: material.unlit.then_some(base_color),
             bsdf: Bsdf::new(&shading, normals.shading, normals.geometric, normals.front),
-            volume: material.enclosed(),
+            before: of(sides[0]).and_then(|m| m.volume),
+            beyond: of(sides[1]).and_then(|m| m.volume),
+            indices: disperses.then_some(indices),
         }
     }
 
@@ -93,7 +121,9 @@ impl Surface {
             emission: Rgb::BLACK,
             unlit: None,
             bsdf: Bsdf::new(&Shading { base_color: Rgb::WHITE, ..Shading::LAMBERT }, n, n, true),
-            volume: None,
+            before: None,
+            beyond: None,
+            indices: None,
         }
     }
 
@@ -110,14 +140,15 @@ impl Surface {
         })
     }
 
-    /// What the ray travelled through on its way here, as far as this surface tells: its volume when the ray met
-    /// the back, `None` for air. The caller attenuates by the length of the way.
-    pub fn interior(&self) -> Option<Volume> {
-        if self.front { None } else { self.volume }
+    /// Whether it bends colours by different angles.
+    pub fn disperses(&self) -> bool {
+        self.indices.is_some()
     }
 
-    /// What lies beyond the surface: its volume when the ray met the front.
-    pub fn beyond(&self) -> Option<Volume> {
-        if self.front { self.volume } else { None }
+    /// Bends light from here on as `hue` is bent.
+    pub fn bend(&mut self, hue: Hue) {
+        if let Some([before, beyond]) = self.indices {
+            self.bsdf.layers.refract_by(before.at(hue) / beyond.at(hue));
+        }
     }
 }

@@ -129,8 +129,8 @@ fn the_inside_of_a_volume_is_behind_its_front() {
         ..Material::default()
     });
     let (outside, inside) = (surface(&scene, Vec3::NEG_Z), surface(&scene, Vec3::Z));
-    assert_eq!((outside.interior(), outside.beyond()), (None, Some(volume)));
-    assert_eq!((inside.interior(), inside.beyond()), (Some(volume), None));
+    assert_eq!((outside.before, outside.beyond), (None, Some(volume)));
+    assert_eq!((inside.before, inside.beyond), (Some(volume), None));
     assert!(!scene.materials[0].may_pass_straight() && scene.materials[0].has_specular(0.5));
 }
 

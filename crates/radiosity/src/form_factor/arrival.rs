@@ -11,7 +11,7 @@ use crate::gather::ROUGH;
 use crate::patches::Patches;
 use geometry::math::offset_origin;
 use geometry::sampling::Rng;
-use geometry::{Ray, Rgb, Surface, World, optics};
+use geometry::{Passage, Ray, Rgb, World};
 
 /// Surfaces that one ray meets at most.
 const LONGEST: usize = 32;
@@ -48,14 +48,13 @@ pub fn follow(
 ) {
     let mut left = Rgb::WHITE;
     let mut way = Way::Straight;
+    let mut passage = Passage::default();
     for _ in 0..LONGEST {
         let Some(hit) = world.bvh.closest_hit(&ray) else { return };
-        let surface = Surface::new(&world.scene, &ray, &hit);
-        if let Some(volume) = surface.interior() {
-            left *= optics::attenuation(volume.attenuation_color, volume.attenuation_distance, hit.t);
-        }
+        let mut surface = world.surface(&ray, &hit);
+        left *= passage.meet(&mut surface, hit.t - ray.t_min, rng);
         if surface.coverage < 1.0 && rng.f32() >= surface.coverage {
-            ray = Ray::new(offset_origin(surface.position, -surface.ng), ray.direction);
+            ray.t_min = hit.t;
             continue;
         }
         if surface.unlit.is_some() {
@@ -77,6 +76,7 @@ pub fn follow(
             let rough = surface.bsdf.glossy_roughness() >= ROUGH;
             way = if way == Way::Straight && rough { Way::Rough } else { Way::Specular };
         }
+        left *= passage.leave(&surface, next.wi);
         let away = if next.wi.dot(surface.ng) > 0.0 { surface.ng } else { -surface.ng };
         ray = Ray::new(offset_origin(surface.position, away), next.wi);
     }

@@ -9,9 +9,10 @@ use super::Layers;
 use crate::direct::{Direct, Gloss, Plan, Spend, direct};
 use crate::render::DiffuseMode;
 use geometry::bsdf::BsdfSample;
+use geometry::dispersion::Hue;
 use geometry::math::{offset_origin, to_world};
 use geometry::sampling::{Lattice2, Rng, cosine_hemisphere};
-use geometry::{Hit, Ray, Rgb, Surface, Vec3, World, optics, photometry};
+use geometry::{Hit, Passage, Ray, Rgb, Surface, Vec3, World, photometry};
 use radiosity::Solution;
 use radiosity::element::Side;
 use radiosity::gather::{self, ROUGH};
@@ -254,17 +255,9 @@ impl Hybrid<'_> {
     /// one for a glossy one.
     ///
     /// - `plan`: the lights that shadow rays at `surface` looked for.
-    /// - `weight`: share of the pixel's light that comes through here, [0, 1].
-    pub fn specular(
-        &self,
-        surface: &Surface,
-        wo: Vec3,
-        plan: &Plan,
-        weight: f32,
-        depth: u32,
-        rng: &mut Rng,
-    ) -> Rgb {
-        if !surface.bsdf.has_specular() || depth >= DEEPEST || !quasi_diffuse(surface, wo).is_black() {
+    fn specular(&self, surface: &Surface, wo: Vec3, plan: &Plan, strand: Strand, rng: &mut Rng) -> Rgb {
+        let beyond = strand.depth >= DEEPEST;
+        if !surface.bsdf.has_specular() || beyond || !quasi_diffuse(surface, wo).is_black() {
             return Rgb::BLACK;
         }
         if !surface.bsdf.is_delta() {
@@ -276,19 +269,19 @@ impl Hybrid<'_> {
                 plan,
                 pdf: next.pdf,
             });
-            return self.follow(surface, &next, weight, depth, from.as_ref(), rng);
+            return self.follow(surface, &next, strand, from.as_ref(), rng);
         }
-        if depth < BRANCHING {
+        if strand.depth < BRANCHING {
             let lobes = surface.bsdf.delta_lobes(wo);
             return lobes
                 .into_iter()
                 .flatten()
-                .map(|next| self.follow(surface, &next, weight, depth, None, rng))
+                .map(|next| self.follow(surface, &next, strand, None, rng))
                 .sum();
         }
         let u = [rng.f32(), rng.f32(), rng.f32()];
         match surface.bsdf.sample_specular(wo, u) {
-            Some(next) => self.follow(surface, &next, weight, depth, None, rng),
+            Some(next) => self.follow(surface, &next, strand, None, rng),
             None => Rgb::BLACK,
         }
     }
@@ -298,44 +291,43 @@ impl Hybrid<'_> {
         &self,
         surface: &Surface,
         next: &BsdfSample,
-        weight: f32,
-        depth: u32,
+        mut strand: Strand,
         from: Option<&From>,
         rng: &mut Rng,
     ) -> Rgb {
         let mut scale = next.weight;
-        let mut weight = weight * scale.max_channel();
-        if weight < CUTOFF {
-            let live = (weight / CUTOFF).max(0.05);
+        strand.weight *= scale.max_channel();
+        if strand.weight < CUTOFF {
+            let live = (strand.weight / CUTOFF).max(0.05);
             if rng.f32() >= live {
                 return Rgb::BLACK;
             }
             scale *= 1.0 / live;
-            weight = CUTOFF;
+            strand.weight = CUTOFF;
         }
+        strand.weight = strand.weight.min(1.0);
+        strand.depth += 1;
+        scale *= strand.passage.leave(surface, next.wi);
         let away = if next.wi.dot(surface.ng) > 0.0 { surface.ng } else { -surface.ng };
         let ray = Ray::new(offset_origin(surface.position, away), next.wi);
-        scale * self.incoming(ray, weight.min(1.0), depth + 1, from, rng)
+        scale * self.incoming(ray, strand, from, rng)
     }
 
     /// Radiance that arrives along `ray`, cd/m².
-    fn incoming(&self, ray: Ray, weight: f32, depth: u32, from: Option<&From>, rng: &mut Rng) -> Rgb {
+    fn incoming(&self, ray: Ray, mut strand: Strand, from: Option<&From>, rng: &mut Rng) -> Rgb {
         let Some(hit) = self.world.closest(&ray) else {
             let Some(sky) = &self.world.scene.sky else { return Rgb::BLACK };
             let share = from.map_or(1.0, |f| f.pdf / (f.pdf + f.plan.density_sky(self.world, ray.direction)));
             return sky.radiance(ray.direction) * share;
         };
-        let surface = Surface::new(&self.world.scene, &ray, &hit);
-        let left = match surface.interior() {
-            Some(v) => optics::attenuation(v.attenuation_color, v.attenuation_distance, hit.t),
-            None => Rgb::WHITE,
-        };
+        let mut surface = self.world.surface(&ray, &hit);
+        let left = strand.passage.meet(&mut surface, hit.t - ray.t_min, rng);
         let mut sum = Rgb::BLACK;
-        if surface.coverage < 1.0 && depth < DEEPEST {
-            let through = weight * (1.0 - surface.coverage);
-            let onward = Ray::new(offset_origin(surface.position, -surface.ng), ray.direction);
-            if through > 1e-3 {
-                sum += self.incoming(onward, through, depth + 1, from, rng) * (1.0 - surface.coverage);
+        if surface.coverage < 1.0 && strand.depth < DEEPEST {
+            let beside = strand.beside(surface.coverage);
+            if beside.weight > 1e-3 {
+                let onward = Ray { t_min: hit.t, ..ray };
+                sum += self.incoming(onward, beside, from, rng) * (1.0 - surface.coverage);
             }
         }
         if surface.coverage > 0.0 {
@@ -347,19 +339,19 @@ impl Hybrid<'_> {
                 }
                 _ => 1.0,
             };
-            let here = surface.emission * share + self.surface(&surface, -ray.direction, weight, depth, rng);
+            let here = surface.emission * share + self.surface(&surface, -ray.direction, strand, rng);
             sum += here * surface.coverage;
         }
         left * sum
     }
 
     /// Light that a surface met by a specular ray sends back, its own emission left out.
-    fn surface(&self, surface: &Surface, wo: Vec3, weight: f32, depth: u32, rng: &mut Rng) -> Rgb {
+    fn surface(&self, surface: &Surface, wo: Vec3, strand: Strand, rng: &mut Rng) -> Rgb {
         if let Some(shown) = surface.unlit {
             return shown;
         }
-        let shadow = if weight > 0.25 { 4 } else { 1 };
-        let photons = if weight > 0.5 { Photons::WhereTheyMatter } else { Photons::Never };
+        let shadow = if strand.weight > 0.25 { 4 } else { 1 };
+        let photons = if strand.weight > 0.5 { Photons::WhereTheyMatter } else { Photons::Never };
         let phase = (rng.f32() * 16.0) as u32;
         let (diffuse, plan) = self.diffuse(
             surface,
@@ -369,10 +361,7 @@ impl Hybrid<'_> {
             &[surface.position],
             rng,
         );
-        diffuse.direct
-            + diffuse.indirect
-            + diffuse.glossy
-            + self.specular(surface, wo, &plan, weight, depth, rng)
+        diffuse.direct + diffuse.indirect + diffuse.glossy + self.specular(surface, wo, &plan, strand, rng)
     }
 
     /// What the eye gets of one primary surface besides its diffuse part: emission as such, and the ray tree.
@@ -382,16 +371,56 @@ impl Hybrid<'_> {
         if let Some(shown) = surface.unlit {
             out.emission += shown;
         } else {
-            out.specular = self.specular(surface, wo, plan, 1.0, 0, rng);
+            let strand = Strand::default();
+            out.specular = match surface.disperses() {
+                false => self.specular(surface, wo, plan, strand, rng),
+                true => self.rainbow(surface, wo, plan, strand, rng),
+            };
         }
         if surface.coverage < 1.0 {
             let onward = Ray::new(offset_origin(surface.position, -surface.ng), ray.direction);
-            let through = 1.0 - surface.coverage;
+            let beside = Strand::default().beside(surface.coverage);
             out.emission *= surface.coverage;
-            out.specular =
-                out.specular * surface.coverage + self.incoming(onward, through, 1, None, rng) * through;
+            out.specular = out.specular * surface.coverage
+                + self.incoming(onward, beside, None, rng) * (1.0 - surface.coverage);
         }
+        // What the eye is in.
+        let left = Passage::default().absorb(surface, surface.position.distance(ray.origin));
+        (out.emission, out.specular) = (out.emission * left, out.specular * left);
         out
+    }
+
+    /// The same as [`Hybrid::specular`] of a prism, by a ray of each colour: chance among them would be noise.
+    fn rainbow(&self, surface: &Surface, wo: Vec3, plan: &Plan, strand: Strand, rng: &mut Rng) -> Rgb {
+        let mut of = |channel| {
+            let (mut surface, mut strand) = (surface.clone(), strand);
+            let mask = strand.passage.part(&mut surface, Hue::of_channel(channel, rng.f32()));
+            mask * self.specular(&surface, wo, plan, strand, rng)
+        };
+        of(0) + of(1) + of(2)
+    }
+}
+
+/// One ray of the tree that starts at the eye.
+#[derive(Clone, Copy, Debug)]
+struct Strand {
+    /// Share of the pixel's light that comes along it, [0, 1].
+    weight: f32,
+    /// Surfaces it has passed.
+    depth: u32,
+    passage: Passage,
+}
+
+impl Default for Strand {
+    fn default() -> Self {
+        Strand { weight: 1.0, depth: 0, passage: Passage::default() }
+    }
+}
+
+impl Strand {
+    /// What goes on beside a surface that covers `coverage` of the way, [0, 1].
+    fn beside(self, coverage: f32) -> Strand {
+        Strand { weight: self.weight * (1.0 - coverage), depth: self.depth + 1, ..self }
     }
 }
 

@@ -14,9 +14,8 @@ use super::{Layers, Seen};
 use crate::film::Pixel;
 use geometry::bsdf::BsdfSample;
 use geometry::math::offset_origin;
-use geometry::optics::attenuation;
 use geometry::sampling::Rng;
-use geometry::{Camera, Ray, Rgb, Surface, Vec3, Volume, World, photometry};
+use geometry::{Camera, Passage, Ray, Rgb, Surface, Vec3, World, photometry};
 use radiosity::caustic::Caustics;
 use radiosity::gather::ROUGH;
 use std::f32::consts::PI;
@@ -126,7 +125,7 @@ struct Path<'a> {
     never_diffuse: Rgb,
     bounces: u32,
     last: Option<Scattering>,
-    medium: Option<Volume>,
+    passage: Passage,
     /// See [`Aid`].
     caustics: Option<&'a Caustics>,
     first: Option<[f32; 2]>,
@@ -167,7 +166,7 @@ impl<'a> Path<'a> {
             never_diffuse: Rgb::WHITE,
             bounces: 0,
             last: None,
-            medium: None,
+            passage: Passage::default(),
             caustics: None,
             first: None,
             chain: None,
@@ -181,11 +180,8 @@ impl<'a> Path<'a> {
                 self.escape();
                 break;
             };
-            let surface = Surface::new(&self.world.scene, &self.ray, &hit);
-            if let Some(medium) = surface.interior().or(self.medium) {
-                let way = hit.t - self.ray.t_min;
-                self.throughput *= attenuation(medium.attenuation_color, medium.attenuation_distance, way);
-            }
+            let mut surface = self.world.surface(&self.ray, &hit);
+            self.throughput *= self.passage.meet(&mut surface, hit.t - self.ray.t_min, rng);
             if surface.coverage < 1.0 && rng.f32() >= surface.coverage {
                 self.ray.t_min = hit.t;
                 straight += 1;
@@ -310,9 +306,7 @@ impl<'a> Path<'a> {
         }
         let s = sample?;
         self.throughput *= s.weight;
-        if s.wi.dot(surface.ng) < 0.0 {
-            self.medium = surface.beyond();
-        }
+        self.throughput *= self.passage.leave(surface, s.wi);
         if s.straight {
             self.ray.t_min = t;
             return Some(true);

@@ -6,7 +6,7 @@
 use super::*;
 use geometry::math::Mat4;
 use geometry::polygon::polygon_irradiance;
-use geometry::{Light, LightKind, Material, MaterialId, Projection, Scene, Sky};
+use geometry::{Light, LightKind, Material, MaterialId, Projection, Scene, Sky, Volume};
 
 /// Lambertian.
 fn matt(rho: f32) -> Material {
