@@ -3,5 +3,6 @@
 mod enclosures;
 mod measure;
 mod optics;
+mod photometric;
 mod reference_data;
 mod shadows;

@@ -1,6 +1,6 @@
 //! Scenes in code: rooms, blocks, balls and lamps.
 
-use geometry::math::Mat4;
+use geometry::math::{Mat3, Mat4};
 use geometry::{
     Camera, Light, LightKind, Material, MaterialId, Part, Projection, Rgb, Scene, Sky, Vec3, World,
 };
@@ -219,6 +219,10 @@ pub fn moved(scene: &Scene, camera: &Camera, scale: f32, turn: Mat4, shift: Vec3
     for light in &mut scene.lights {
         match &mut light.kind {
             LightKind::Point { position, .. } => *position = place(*position),
+            LightKind::Photometric { position, turn: of, .. } => {
+                *position = place(*position);
+                *of *= Mat3::from_mat4(turn).transpose();
+            }
             LightKind::Spot { position, direction, .. } => {
                 *position = place(*position);
                 *direction = turn.transform_vector3(*direction);

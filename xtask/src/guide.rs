@@ -18,6 +18,7 @@ pub fn run() -> Result<()> {
     let _ = fs::remove_dir_all(&dir);
     fs::create_dir_all(&dir)?;
     fs::copy(root.join("assets/gallery.glb"), dir.join("room.glb"))?;
+    fs::copy(root.join("assets/downlight.ies"), dir.join("downlight.ies"))?;
     for command in commands(&text) {
         println!("$ {}", command.join(" "));
         let start = Instant::now();

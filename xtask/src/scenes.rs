@@ -5,6 +5,7 @@
 
 pub mod cornell;
 pub mod document;
+pub mod downlight;
 pub mod furnace;
 mod gallery;
 pub mod material;
@@ -47,6 +48,7 @@ pub fn write(assets: &Path) -> Result<()> {
         std::fs::write(&path, &bytes).with_context(|| format!("writing {}", path.display()))?;
         println!("{name}: {triangles} triangles, {} kB", bytes.len().div_ceil(1000));
     }
+    std::fs::write(assets.join(downlight::NAME), downlight::downlight())?;
     Ok(())
 }
 
@@ -56,6 +58,10 @@ pub fn check(assets: &Path) -> Result<()> {
         .iter()
         .filter(|(name, describe)| std::fs::read(assets.join(name)).ok() != Some(bytes(name, describe())))
         .map(|(name, _)| *name)
+        .chain(
+            (std::fs::read(assets.join(downlight::NAME)).ok() != Some(downlight::downlight().into_bytes()))
+                .then_some(downlight::NAME),
+        )
         .collect();
     ensure!(stale.is_empty(), "not what `cargo xtask scenes` writes: {}", stale.join(", "));
     Ok(())

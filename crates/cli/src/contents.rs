@@ -223,11 +223,13 @@ fn surface(m: &Material, area: f32, scene: &Scene) -> Option<LightRow> {
 fn lamps(scene: &Scene) -> impl Iterator<Item = LightRow> {
     scene.lights.iter().map(|l| {
         let intensity = l.intensity.luminance();
-        let (kind, unit, lumens) = match l.kind {
-            LightKind::Point { .. } => ("point", "cd", Some(4.0 * PI * intensity)),
-            LightKind::Spot { .. } => ("spot", "cd", None),
-            LightKind::Directional { .. } => ("directional", "lx", None),
+        let (kind, unit) = match l.kind {
+            LightKind::Point { .. } => ("point", "cd"),
+            LightKind::Spot { .. } => ("spot", "cd"),
+            LightKind::Photometric { .. } => ("photometric", "cd"),
+            LightKind::Directional { .. } => ("directional", "lx"),
         };
+        let lumens = (unit == "cd").then(|| l.flux(0.0).luminance());
         LightRow { name: l.name.clone(), kind, intensity, unit, lumens, area: None }
     })
 }

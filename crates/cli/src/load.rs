@@ -5,16 +5,43 @@ use crate::job::AskedWrongly;
 use crate::values::SkyValue;
 use anyhow::{Context, Result};
 use geometry::gltf::{self, Error, Loaded, Options};
-use geometry::{Rgb, Sky};
-use std::path::Path;
+use geometry::ies::{self, Web};
+use geometry::{Light, LightKind, Rgb, Sky};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Reads a scene. A scene or variant that is not in the file was asked for wrongly.
-pub fn scene(path: &Path, which: &WhichArgs) -> Result<Loaded> {
+pub fn scene(path: &Path, which: &WhichArgs, webs: &[(String, PathBuf)]) -> Result<Loaded> {
     let WhichArgs { scene, variant, time } = which.clone();
-    gltf::load_with(path, &Options { scene, variant, time, ..Options::default() }).map_err(|e| match e {
-        Error::NoSuch { .. } => AskedWrongly(e.to_string()).into(),
+    let webs: Result<Vec<_>> =
+        webs.iter().map(|(name, file)| Ok((name.clone(), Arc::new(web(file)?)))).collect();
+    let options = Options { scene, variant, time, webs: webs?, ..Options::default() };
+    let loaded = gltf::load_with(path, &options).map_err(|e| match e {
+        Error::NoSuch { .. } => anyhow::Error::from(AskedWrongly(e.to_string())),
         e => e.into(),
-    })
+    })?;
+    let measured = |light: &&Light| matches!(light.kind, LightKind::Photometric { .. });
+    for (name, _) in &options.webs {
+        if !loaded.scene.lights.iter().filter(measured).any(|light| light.name == *name) {
+            let place = |light: &&Light| !matches!(light.kind, LightKind::Directional { .. });
+            let names: Vec<&str> =
+                loaded.scene.lights.iter().filter(place).map(|l| l.name.as_str()).collect();
+            let known = if names.is_empty() { "none".into() } else { names.join(", ") };
+            return Err(AskedWrongly(format!(
+                "there is no point or spot lamp {name:?}; the file has {known}"
+            ))
+            .into());
+        }
+    }
+    Ok(loaded)
+}
+
+/// Reads a photometric file.
+fn web(path: &Path) -> Result<Web> {
+    let cannot = || format!("cannot use {} as a photometric file", path.display());
+    let size = std::fs::metadata(path).with_context(cannot)?.len();
+    anyhow::ensure!(size <= ies::LARGEST as u64, "{}: {size} bytes are too many for one", cannot());
+    ies::parse(&std::fs::read(path).with_context(cannot)?).with_context(cannot)
 }
 
 /// Makes the sky that was asked for, `strength` times as bright.

@@ -58,7 +58,7 @@ impl Room {
 
 /// The scene of `path` as it is to shine.
 fn load_lit(path: &Path, which: &WhichArgs, light: &LightArgs) -> Result<Loaded> {
-    let mut loaded = load::scene(path, which)?;
+    let mut loaded = load::scene(path, which, &light.webs)?;
     if let Some(value) = &light.sky {
         loaded.scene.sky = Some(load::sky(value, light.sky_strength)?);
     }

@@ -130,6 +130,14 @@ pub fn light(s: &str) -> Result<(String, Rgb), String> {
     }
 }
 
+/// A photometric file for the lamps of a name: "Desk lamp=downlight.ies".
+pub fn web(s: &str) -> Result<(String, PathBuf), String> {
+    match s.split_once('=') {
+        Some((name, file)) if !name.is_empty() && !file.is_empty() => Ok((name.into(), file.into())),
+        _ => Err("write NAME=FILE, such as Lamp=downlight.ies".into()),
+    }
+}
+
 /// A finite number that is not negative.
 pub fn strength(s: &str) -> Result<f32, String> {
     let value = number(s)?;

@@ -71,6 +71,7 @@ mod tests {
     use super::*;
     use crate::scene::LightKind;
     use crate::{MaterialId, Mesh};
+    use std::sync::Arc;
 
     fn scene() -> Scene {
         Scene {
@@ -98,11 +99,17 @@ mod tests {
         brighter.materials[0].emissive = Rgb::new(3.0, 2.0, 1.0);
         brighter.lights[0].intensity = Rgb::splat(7.0);
         assert_eq!(brighter.fingerprint(), known);
-        let changes: [fn(&mut Scene); 5] = [
+        let changes: [fn(&mut Scene); 6] = [
             |s| s.mesh.positions[1].x = 1.000_000_1,
             |s| s.mesh.triangles[0] = [0, 1, 2],
             |s| s.materials[0].roughness = 0.5,
             |s| s.lights[0].kind = LightKind::Point { position: Vec3::X, range: f32::INFINITY },
+            |s| {
+                let file = b"TILT=NONE\n1 -1 1 2 1 1 2 0 0 0 1 1 0 0 180 0 2 1";
+                let web = Arc::new(crate::ies::parse(file).expect("a web"));
+                let (position, turn, range) = (Vec3::Y, web.frame(), f32::INFINITY);
+                s.lights[0].kind = LightKind::Photometric { position, turn, range, web };
+            },
             |s| s.sky = Some(Sky::Constant(Rgb::WHITE)),
         ];
         for (i, change) in changes.iter().enumerate() {

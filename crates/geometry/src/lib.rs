@@ -34,6 +34,7 @@ pub mod dispersion;
 pub mod emitter;
 pub mod fingerprint;
 pub mod gltf;
+pub mod ies;
 pub mod light_groups;
 pub mod lobes;
 pub mod math;

@@ -1,8 +1,10 @@
 //! Meshes, materials, textures and lights: plain data, metres, world space.
 
+use crate::ies::Web;
 use crate::lobes::{Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, Sheen};
-use crate::math::{Affine2, Vec3};
+use crate::math::{Affine2, Mat3, Vec3};
 use crate::{Mesh, Rgb, Sky, Texture};
+use std::sync::Arc;
 
 /// Index into [`Scene::materials`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -162,14 +164,14 @@ pub struct TextureRef {
 pub struct Light {
     /// Name in the file.
     pub name: String,
-    /// Colour times intensity: cd for point and spot, lx for directional.
+    /// Colour times intensity: cd for lamps with a place, lx for directional.
     pub intensity: Rgb,
     /// Which kind, and where.
     pub kind: LightKind,
 }
 
-/// The three kinds of KHR_lights_punctual. Directions are unit and point the way the light travels.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The three kinds of KHR_lights_punctual, and measured lamps. Directions are unit and point the way the light travels.
+#[derive(Clone, Debug, PartialEq)]
 pub enum LightKind {
     /// Shines alike in all directions.
     Point {
@@ -190,6 +192,17 @@ pub enum LightKind {
         cos_outer: f32,
         /// Beyond this it does not reach, m.
         range: f32,
+    },
+    /// A lamp as its maker measured it (EXT_lights_ies); the light's intensity is the greatest of its directions.
+    Photometric {
+        /// Where it is.
+        position: Vec3,
+        /// From directions in the world to those of the table: a rotation.
+        turn: Mat3,
+        /// Beyond this it does not reach, m.
+        range: f32,
+        /// Its intensity by direction.
+        web: Arc<Web>,
     },
     /// Parallel light from infinitely far.
     Directional {

@@ -21,6 +21,7 @@ pub use views::ViewArgs;
 use crate::values::{self, SkyValue};
 use clap::{Args, Parser, Subcommand};
 use geometry::Rgb;
+use std::path::PathBuf;
 
 /// Render glTF rooms in physical units: radiosity once, rays for the rest.
 #[derive(Debug, Parser)]
@@ -86,6 +87,9 @@ pub struct LightArgs {
     /// Make the lamps of this name (of light, emissive material, or `sky`) so many times as bright: 0 is off; R,G,B tints
     #[arg(long = "light", value_name = "NAME=FACTOR", value_parser = values::light)]
     pub lights: Vec<(String, Rgb)>,
+    /// Let the point or spot lamps of this name shine as a photometric file (IES LM-63) says, aimed along -z of their nodes
+    #[arg(long = "ies", value_name = "NAME=FILE", value_parser = values::web)]
+    pub webs: Vec<(String, PathBuf)>,
     /// Light from beyond the scene: a panorama (.hdr, .exr) or an even radiance in cd/m2, V or R,G,B
     #[arg(long, value_name = "FILE|R,G,B", value_parser = values::sky)]
     pub sky: Option<SkyValue>,

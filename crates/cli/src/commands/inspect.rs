@@ -19,7 +19,7 @@ pub fn run(args: &InspectArgs) -> Result<ExitCode> {
         print(&solutions::described(&args.scene, args.json)?)?;
         return Ok(ExitCode::SUCCESS);
     }
-    let loaded = load::scene(&args.scene, &args.which)?;
+    let loaded = load::scene(&args.scene, &args.which, &[])?;
     if args.plan {
         return plan(args, loaded);
     }

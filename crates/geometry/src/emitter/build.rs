@@ -168,6 +168,19 @@ fn bounds(light: &EmitterKind) -> LightBounds {
                 intensity: intensity.mean(),
             }
         }
+        EmitterKind::Punctual(Light {
+            intensity,
+            kind: LightKind::Photometric { position, turn, web, .. },
+            ..
+        }) => LightBounds {
+            lo: *position,
+            hi: *position,
+            axis: turn.transpose() * web.aim(),
+            spread: web.reach(),
+            reach: 0.01,
+            two_sided: false,
+            intensity: intensity.mean(),
+        },
         EmitterKind::Punctual(_) | EmitterKind::Sky(_) => {
             unreachable!("lights without a place stay out of the tree")
         }

@@ -1,7 +1,7 @@
 //! Light's own rays: photons that leave the lights, at random or toward what bends them.
 
 use super::area::PolygonLight;
-use super::{EmitterKind, Emitters, hit_at, range_window, shone_at, spot_falloff};
+use super::{EmitterKind, Emitters, hit_at, range_window, shone_at};
 use crate::math::{Vec2, Vec3, frame, offset_origin, to_world};
 use crate::scene::{Light, LightKind};
 use crate::{Ray, Rgb, Scene, sampling};
@@ -65,16 +65,22 @@ impl Emitters {
             EmitterKind::Textured(shape) => start.leave_polygon(shape, a, b, |(point, d)| {
                 shone_at(scene, &hit_at(scene, shape.triangles[0], point, 0.0), d.dot(shape.normal) > 0.0)
             })?,
-            EmitterKind::Punctual(Light { intensity, kind, .. }) => match *kind {
-                LightKind::Directional { direction } => start.come_from_afar(direction, a, *intensity)?,
-                LightKind::Point { position, range: r } => {
-                    range = r;
-                    start.leave_lamp(position, Vec3::Y, -1.0, b, |_| *intensity)?
+            EmitterKind::Punctual(lamp) => match &lamp.kind {
+                LightKind::Directional { direction } => {
+                    start.come_from_afar(*direction, a, lamp.intensity)?
                 }
-                LightKind::Spot { position, direction, cos_inner, cos_outer, range: r } => {
-                    range = r;
-                    let intensity = |cos| *intensity * spot_falloff(cos, cos_inner, cos_outer);
-                    start.leave_lamp(position, direction, cos_outer, b, intensity)?
+                LightKind::Point { position, range: r } => {
+                    range = *r;
+                    start.leave_cone(lamp, *position, Vec3::Y, -1.0, b)?
+                }
+                LightKind::Spot { position, direction, cos_outer, range: r, .. } => {
+                    range = *r;
+                    start.leave_cone(lamp, *position, *direction, *cos_outer, b)?
+                }
+                LightKind::Photometric { position, turn, range: r, web } => {
+                    range = *r;
+                    let draw = || turn.transpose() * web.sample(b);
+                    start.leave_lamp(lamp, *position, b, draw, |d| web.pdf(*turn * d))?
                 }
             },
             EmitterKind::Sky(sky) => {
@@ -109,20 +115,33 @@ impl Start<'_> {
         Some((ray, flux))
     }
 
-    /// From a point, within the cone of cosine `cos_outer` around `axis`, its intensity (cd) by the cosine.
-    fn leave_lamp(
+    /// From a point, even within the cone of cosine `cos_outer` around `axis`.
+    fn leave_cone(
         &self,
+        lamp: &Light,
         position: Vec3,
         axis: Vec3,
         cos_outer: f32,
         b: [f32; 2],
-        intensity: impl Fn(f32) -> Rgb,
     ) -> Option<(Ray, Rgb)> {
         let solid_angle = TAU * (1.0 - cos_outer);
         let plain = |d: Vec3| if d.dot(axis) >= cos_outer - 1e-6 { 1.0 / solid_angle } else { 0.0 };
-        let (d, ratio) =
-            self.direction(position, b, || to_world(sampling::cone(Vec2::from(b), cos_outer), axis), plain)?;
-        Some((Ray::new(position, d), intensity(d.dot(axis)) * (solid_angle * ratio / self.probability)))
+        let draw = || to_world(sampling::cone(Vec2::from(b), cos_outer), axis);
+        self.leave_lamp(lamp, position, b, draw, plain)
+    }
+
+    /// From a point, along what `draw` gives with the density `plain`, 1/sr.
+    fn leave_lamp(
+        &self,
+        lamp: &Light,
+        position: Vec3,
+        b: [f32; 2],
+        draw: impl Fn() -> Vec3,
+        plain: impl Fn(Vec3) -> f32,
+    ) -> Option<(Ray, Rgb)> {
+        let (d, ratio) = self.direction(position, b, draw, &plain)?;
+        let weight = lamp.relative(d) * ratio / (plain(d) * self.probability);
+        weight.is_finite().then(|| (Ray::new(position, d), lamp.intensity * weight))
     }
 
     /// Along `d` from a disc outside the scene, with the irradiance (lx) across it.
@@ -234,6 +253,8 @@ mod tests {
     use super::*;
     use crate::Sky;
     use crate::emitter::testing::{points, quad, scene_of};
+    use crate::math::Mat3;
+    use std::sync::Arc;
 
     /// Everything that shines, and one draw for each point of a low-discrepancy sequence.
     fn scene() -> Scene {
@@ -241,10 +262,15 @@ mod tests {
         scene.materials[0].double_sided = true;
         scene.sky = Some(Sky::Constant(Rgb::splat(0.3)));
         let (position, direction, range) = (Vec3::new(1.0, 3.0, 0.0), Vec3::NEG_Y, f32::INFINITY);
+        let ies = "TILT=NONE\n";
+        let file =
+            format!("{ies}1 -1 1 5 3 1 2 0 0 0 1 1 0 0 30 60 90 180 0 60 180 9 7 5 1 0 9 5 2 0 0 9 9 1 1 1");
+        let web = Arc::new(crate::ies::parse(file.as_bytes()).expect("a web"));
         scene.lights = [
             LightKind::Directional { direction: Vec3::new(0.6, -0.8, 0.0) },
             LightKind::Point { position, range },
             LightKind::Spot { position, direction, cos_inner: 0.9, cos_outer: 0.7, range },
+            LightKind::Photometric { position, turn: web.frame() * Mat3::from_rotation_x(0.7), range, web },
         ]
         .map(|kind| Light { name: String::new(), intensity: Rgb::splat(2.0), kind })
         .to_vec();

@@ -25,28 +25,38 @@ impl Light {
     /// What arrives at `p`: the unit direction toward the lamp, the distance (m, infinite for a directional light)
     /// and the irradiance on a surface that faces it, lx. `None` where no light arrives.
     pub fn reaching(&self, p: Vec3) -> Option<(Vec3, f32, Rgb)> {
-        let (position, range, axis) = match self.kind {
+        let (position, range) = match self.kind {
             LightKind::Directional { direction } => return Some((-direction, f32::INFINITY, self.intensity)),
-            LightKind::Point { position, range } => (position, range, None),
-            LightKind::Spot { position, direction, cos_inner, cos_outer, range } => {
-                (position, range, Some((direction, cos_inner, cos_outer)))
-            }
+            LightKind::Point { position, range }
+            | LightKind::Spot { position, range, .. }
+            | LightKind::Photometric { position, range, .. } => (position, range),
         };
         let way = position - p;
         let d = way.length();
         let wi = way / d;
-        let cone = axis.map_or(1.0, |(axis, inner, outer)| spot_falloff(-wi.dot(axis), inner, outer));
-        let share = cone * range_window(d, range) / (d * d);
+        let share = self.relative(-wi) * range_window(d, range) / (d * d);
         (share > 0.0 && share.is_finite()).then(|| (wi, d, self.intensity * share))
     }
 
-    /// Light that leaves a point or a spot, lm, by the integral of its intensity over all directions, without its
+    /// Intensity along the unit direction `d`, away from the lamp, over [`Light::intensity`], [0, 1]; 1 for a point.
+    pub fn relative(&self, d: Vec3) -> f32 {
+        match &self.kind {
+            LightKind::Point { .. } | LightKind::Directional { .. } => 1.0,
+            LightKind::Spot { direction, cos_inner, cos_outer, .. } => {
+                spot_falloff(d.dot(*direction), *cos_inner, *cos_outer)
+            }
+            LightKind::Photometric { turn, web, .. } => web.relative(*turn * d),
+        }
+    }
+
+    /// Light that leaves a lamp with a place, lm, by the integral of its intensity over all directions, without its
     /// range; for a directional light what passes through a disc of `radius`, m.
     pub fn flux(&self, radius: f32) -> Rgb {
         self.intensity
             * match self.kind {
                 LightKind::Point { .. } => 4.0 * PI,
                 LightKind::Directional { .. } => PI * radius * radius,
+                LightKind::Photometric { ref web, .. } => web.solid_angle(),
                 LightKind::Spot { cos_inner, cos_outer, .. } => {
                     // ∫ x² dc over the rim of width w, and 1 over the rest of the cone.
                     let rim = (cos_inner - cos_outer).max(0.001);

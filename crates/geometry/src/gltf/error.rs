@@ -94,3 +94,11 @@ impl Error {
         }
     }
 }
+
+/// An error with its cause, on one line.
+pub(super) fn chain(e: &Error) -> String {
+    match std::error::Error::source(e) {
+        Some(cause) => format!("{e}: {cause}"),
+        None => e.to_string(),
+    }
+}

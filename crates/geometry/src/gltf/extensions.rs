@@ -6,7 +6,8 @@ use super::error::Error;
 use super::warnings::Warnings;
 
 /// Modelled, wherever the file uses them.
-const MODELLED: [&str; 22] = [
+const MODELLED: [&str; 23] = [
+    "EXT_lights_ies",
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",

@@ -1,5 +1,7 @@
 //! KHR_lights_punctual: lamps without extent, placed by their nodes.
 
+use std::sync::Arc;
+
 use gltf::json;
 use gltf::json::extensions::scene::khr_lights_punctual::Type;
 use gltf::json::validation::Checked;
@@ -7,14 +9,17 @@ use gltf::json::validation::Checked;
 use super::document::Document;
 use super::error::Error;
 use super::nodes::Placed;
+use super::profiles;
 use super::warnings::Warnings;
 use crate::Rgb;
+use crate::ies::Web;
 use crate::scene::{Light, LightKind};
 
 /// The lamp of a node, if it has one and it is usable.
 pub(super) fn read(
     document: &Document,
     placed: &Placed,
+    webs: &[(String, Arc<Web>)],
     warnings: &mut Warnings,
 ) -> Result<Option<Light>, Error> {
     let node = &document.root.nodes[placed.node];
@@ -27,12 +32,28 @@ pub(super) fn read(
     })?;
     let name = node.name.clone().or_else(|| light.name.clone()).unwrap_or_else(|| format!("light {i}"));
     match kind(light, placed, &name, warnings) {
-        Ok(kind) => Ok(Some(Light { intensity: Rgb::from(light.color) * light.intensity, name, kind })),
+        Ok(kind) => {
+            let plain = Light { intensity: Rgb::from(light.color) * light.intensity, name, kind };
+            let web = webs.iter().rev().find(|(name, _)| *name == plain.name);
+            Ok(Some(web.and_then(|(_, web)| measured(&plain, placed, web)).unwrap_or(plain)))
+        }
         Err(problem) => {
             warnings.say(format!("light \"{name}\" is left out: {problem}"));
             Ok(None)
         }
     }
+}
+
+/// `light` as its maker measured it: its colour and reach, the web's candela. `None` for a sun, which has none.
+fn measured(light: &Light, placed: &Placed, web: &Arc<Web>) -> Option<Light> {
+    let range = match light.kind {
+        LightKind::Point { range, .. } | LightKind::Spot { range, .. } => range,
+        _ => return None,
+    };
+    let level = light.intensity.luminance();
+    let color = if level > 0.0 { light.intensity / level } else { Rgb::WHITE };
+    let kind = profiles::kind(&placed.world, web, range)?;
+    Some(Light { name: light.name.clone(), intensity: color * web.peak(), kind })
 }
 
 fn kind(
@@ -91,6 +112,10 @@ mod tests {
     use crate::math::Vec3;
 
     fn light(light: &str) -> (Option<Light>, Vec<String>) {
+        light_with(light, &[])
+    }
+
+    fn light_with(light: &str, webs: &[(String, Arc<Web>)]) -> (Option<Light>, Vec<String>) {
         let json = format!(
             r#""extensions":{{"KHR_lights_punctual":{{"lights":[{{{light}}}]}}}},"nodes":[{{"name":"L",
             "translation":[1,2,3],"rotation":[-0.70710678,0,0,0.70710678],"scale":[2,2,2],
@@ -99,7 +124,7 @@ mod tests {
         let document = Document::for_test(&json, Vec::new());
         let placed = walk(&document, None, &Default::default(), &mut Warnings::default()).expect("a tree");
         let mut warnings = Warnings::default();
-        let light = read(&document, &placed[0], &mut warnings).expect("valid");
+        let light = read(&document, &placed[0], webs, &mut warnings).expect("valid");
         (light, warnings.into_lines())
     }
 
@@ -117,6 +142,23 @@ mod tests {
             panic!("a spot")
         };
         assert!(cos_inner == 1.0 && (cos_outer - 0.5).abs() < 1e-6 && range == f32::INFINITY);
+    }
+
+    #[test]
+    fn a_photometric_file_takes_the_place_of_an_intensity() {
+        let file = "TILT=NONE\n1 -1 1 2 1 1 2 0 0 0 1 1 0\n0 90\n0\n300 0";
+        let webs = [("L".to_owned(), Arc::new(crate::ies::parse(file.as_bytes()).expect("a web")))];
+        let (lamp, _) = light_with(r#""type":"point","intensity":5,"color":[1,0.5,0],"range":7"#, &webs);
+        let lamp = lamp.expect("usable");
+        assert!(
+            (lamp.intensity.luminance() - 300.0).abs() < 1e-3 && lamp.intensity.g == 0.5 * lamp.intensity.r
+        );
+        assert!(matches!(lamp.kind, LightKind::Photometric { range: 7.0, .. }));
+        assert!((lamp.relative(Vec3::NEG_Y) - 1.0).abs() < 1e-4 && lamp.relative(Vec3::Y) == 0.0);
+        let (other, _) = light_with(r#""type":"point""#, &[("M".to_owned(), Arc::clone(&webs[0].1))]);
+        assert!(matches!(other.expect("usable").kind, LightKind::Point { .. }));
+        let (sun, _) = light_with(r#""type":"directional""#, &webs);
+        assert!(matches!(sun.expect("usable").kind, LightKind::Directional { .. }));
     }
 
     #[test]

@@ -23,6 +23,7 @@ mod meshopt;
 mod nodes;
 mod options;
 mod primitive;
+mod profiles;
 mod tangents;
 mod textures;
 mod topology;
@@ -126,12 +127,14 @@ fn import(path: &Path, options: &Options) -> Result<Loaded, Error> {
         (Some(_), 2..) => warnings.say("of several animations the first is shown"),
         _ => {}
     }
+    let webs = profiles::load(&mut document, &mut warnings)?;
     let variant = options.variant.as_ref().map(|name| variants::find(&document, name)).transpose()?;
     let placed = nodes::walk(&document, options.scene.as_deref(), &pose, &mut warnings)?;
     let mut cameras = Vec::new();
     for node in &placed {
         cameras.extend(cameras::read(&document, node, &mut warnings)?);
-        scene.lights.extend(lights::read(&document, node, &mut warnings)?);
+        scene.lights.extend(lights::read(&document, node, &options.webs, &mut warnings)?);
+        scene.lights.extend(profiles::read(&document, node, &webs, &mut warnings)?);
     }
     cameras::make_names_differ(&mut cameras);
     scene.textures = textures::load(&mut document, &mut scene.materials, &mut warnings)?;

@@ -1,6 +1,9 @@
 //! What of a file to show.
 
+use std::sync::Arc;
+
 use super::limits::Limits;
+use crate::ies::Web;
 
 /// Which of the things that a file offers are loaded, and how much of them.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -11,6 +14,8 @@ pub struct Options {
     pub variant: Option<String>,
     /// Time in the first animation, s; the rest pose if absent.
     pub time: Option<f32>,
+    /// Photometric webs for lamps by name, in place of what the file says of their intensity.
+    pub webs: Vec<(String, Arc<Web>)>,
     /// Bounds on what the file may ask for.
     pub limits: Limits,
 }

@@ -10,7 +10,7 @@ use image::ImageReader;
 use rayon::prelude::*;
 
 use super::document::Document;
-use super::error::Error;
+use super::error::{Error, chain};
 use super::limits::Limits;
 use super::materials::texture_refs;
 use super::warnings::Warnings;
@@ -254,14 +254,6 @@ fn measure(sources: &mut [Source], limits: &Limits, warnings: &mut Warnings) {
             }
         };
         warnings.say(format!("image \"{}\" is left out: {problem}", source.name));
-    }
-}
-
-/// An error with its cause, on one line.
-fn chain(e: &Error) -> String {
-    match std::error::Error::source(e) {
-        Some(cause) => format!("{e}: {cause}"),
-        None => e.to_string(),
     }
 }
 

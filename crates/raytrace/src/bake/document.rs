@@ -186,7 +186,7 @@ fn add_camera(writer: &mut Writer, camera: &Camera, diagonal: f32) {
 
 /// The lamps that a viewer lights the scene with.
 fn add_lamps(writer: &mut Writer, world: &World) {
-    let mut lamps = Vec::new();
+    let (mut lamps, mut measured) = (Vec::new(), Vec::new());
     for light in &world.scene.lights {
         let strength = light.intensity.max_channel();
         if strength <= 0.0 {
@@ -197,14 +197,34 @@ fn add_lamps(writer: &mut Writer, world: &World) {
             "color": (light.intensity / strength).to_array(),
             "intensity": strength,
         });
-        let (kind, place, along, range) = match light.kind {
-            LightKind::Point { position, range } => ("point", position, Vec3::NEG_Z, range),
-            LightKind::Directional { direction } => ("directional", Vec3::ZERO, direction, f32::INFINITY),
+        let (kind, place, along, range) = match &light.kind {
+            LightKind::Photometric { position, turn, web, .. } => {
+                let text: String = web.to_lm63().replace(' ', "%20").replace('\n', "%0A");
+                let rotation = Quat::from_mat3(&(turn.transpose() * web.frame())).normalize();
+                let instance = json!({
+                    "light": measured.len(),
+                    "multiplier": strength / web.peak(),
+                    "color": (light.intensity / strength).to_array(),
+                });
+                measured.push(json!({ "uri": format!("data:application/x-ies-lm-63,{text}") }));
+                writer.push(
+                    "nodes",
+                    json!({
+                        "name": light.name,
+                        "translation": position.to_array(),
+                        "rotation": rotation.to_array(),
+                        "extensions": { "EXT_lights_ies": instance },
+                    }),
+                );
+                continue;
+            }
+            LightKind::Point { position, range } => ("point", *position, Vec3::NEG_Z, *range),
+            LightKind::Directional { direction } => ("directional", Vec3::ZERO, *direction, f32::INFINITY),
             LightKind::Spot { position, direction, cos_inner, cos_outer, range } => {
-                let [inner, outer] = [cos_inner, cos_outer].map(|c| c.clamp(0.0, 1.0).acos());
+                let [inner, outer] = [*cos_inner, *cos_outer].map(|c| c.clamp(0.0, 1.0).acos());
                 json["spot"] =
                     json!({ "innerConeAngle": inner.min(outer - 1e-4).max(0.0), "outerConeAngle": outer });
-                ("spot", position, direction, range)
+                ("spot", *position, *direction, *range)
             }
         };
         json["type"] = json!(kind);
@@ -228,6 +248,10 @@ fn add_lamps(writer: &mut Writer, world: &World) {
     if !lamps.is_empty() {
         writer.uses("KHR_lights_punctual");
         writer.extensions.insert("KHR_lights_punctual".into(), json!({ "lights": lamps }));
+    }
+    if !measured.is_empty() {
+        writer.uses("EXT_lights_ies");
+        writer.extensions.insert("EXT_lights_ies".into(), json!({ "lights": measured }));
     }
 }
 
