@@ -43,6 +43,11 @@ static SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| {
     })
 });
 
+/// Linear light, [0, 1], of a byte in sRGB.
+pub fn srgb_decode(byte: u8) -> f32 {
+    SRGB[usize::from(byte)]
+}
+
 impl Texture {
     /// Colour decoded from sRGB to linear, and linear alpha, at `uv`.
     ///

@@ -6,8 +6,9 @@ use super::error::Error;
 use super::warnings::Warnings;
 
 /// Modelled, wherever the file uses them.
-const MODELLED: [&str; 23] = [
+const MODELLED: [&str; 24] = [
     "EXT_lights_ies",
+    "EXT_lights_image_based",
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",

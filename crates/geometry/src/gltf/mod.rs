@@ -12,6 +12,7 @@ mod clean;
 mod deform;
 mod document;
 mod draco;
+mod environment;
 mod error;
 mod extensions;
 mod instancing;
@@ -137,6 +138,8 @@ fn import(path: &Path, options: &Options) -> Result<Loaded, Error> {
         scene.lights.extend(profiles::read(&document, node, &webs, &mut warnings)?);
     }
     cameras::make_names_differ(&mut cameras);
+    let number = nodes::scene_number(&document, options.scene.as_deref())?;
+    scene.sky = environment::load(&mut document, number, &mut warnings)?;
     scene.textures = textures::load(&mut document, &mut scene.materials, &mut warnings)?;
 
     let uses = uses_of_meshes(&document, &placed, &pose)?;

@@ -87,10 +87,7 @@ fn roots(
     warnings: &mut Warnings,
 ) -> Result<Vec<usize>, Error> {
     let root = &document.root;
-    let scene = match asked {
-        Some(asked) => find(document, asked)?,
-        None => root.scene.map_or(0, |scene| scene.value()),
-    };
+    let scene = scene_number(document, asked)?;
     let Some(chosen) = root.scenes.get(scene) else {
         if root.scene.is_some() {
             return Err(document.fault("scene", scene, "there is no scene of this number"));
@@ -115,6 +112,14 @@ fn roots(
         return Err(document.fault(format_args!("scenes[{scene}].nodes[{k}]"), i, problem));
     }
     Ok(chosen.nodes.iter().map(|node| node.value()).collect())
+}
+
+/// The number of the scene asked for, or of the default one; there may be no scene of it.
+pub(super) fn scene_number(document: &Document, asked: Option<&str>) -> Result<usize, Error> {
+    match asked {
+        Some(asked) => find(document, asked),
+        None => Ok(document.root.scene.map_or(0, |scene| scene.value())),
+    }
 }
 
 /// The number of the scene of that name, or of that number where none has the name.

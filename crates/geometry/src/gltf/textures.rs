@@ -87,6 +87,31 @@ pub(super) fn load(
     Ok(textures)
 }
 
+/// The images of these numbers, decoded, within the limits; `None`, with a warning, where one cannot be had.
+pub(super) fn images(
+    document: &mut Document,
+    numbers: &[usize],
+    warnings: &mut Warnings,
+) -> Result<Option<Vec<Texture>>, Error> {
+    let sampler = Sampler { wrap_s: 2, wrap_t: 2, linear: true };
+    let mut sources = Vec::new();
+    for &image in numbers {
+        let Some(source) = Source::fetch(document, image, sampler, warnings)? else { return Ok(None) };
+        sources.push(source);
+    }
+    measure(&mut sources, &document.limits, warnings);
+    let decoded: Result<Vec<Texture>, String> = sources.into_par_iter().map(Source::decode).collect();
+    match decoded {
+        Ok(images) => Ok(Some(images)),
+        Err(problem) => {
+            if !problem.is_empty() {
+                warnings.say(problem);
+            }
+            Ok(None)
+        }
+    }
+}
+
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 struct Sampler {
     wrap_s: u8,

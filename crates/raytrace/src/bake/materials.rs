@@ -3,7 +3,7 @@
 use super::look::Look;
 use crate::tonemap::srgb_encode;
 use geometry::gltf::write::Writer;
-use geometry::texture::Wrap;
+use geometry::texture::{Wrap, srgb_decode};
 use geometry::{AlphaMode, Material, Rgb, Scene, Texture, TextureRef};
 use serde_json::{Map, Value, json};
 use std::collections::HashMap;
@@ -328,12 +328,6 @@ pub fn light_texture(
 fn peak(texture: &Texture) -> f32 {
     let byte = texture.texels.iter().flat_map(|t| [t[0], t[1], t[2]]).max().unwrap_or(255);
     if byte > 240 { 1.0 } else { srgb_decode(byte.max(1)) }
-}
-
-/// IEC 61966-2-1.
-fn srgb_decode(byte: u8) -> f32 {
-    let c = f32::from(byte) / 255.0;
-    if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
 }
 
 fn png(texture: &Texture, alpha: bool, gain: f32) -> Option<Vec<u8>> {
