@@ -176,7 +176,8 @@ impl Build {
         let Scene { mesh, materials, .. } = &mut self.scene;
         let (first, id) = (mesh.positions.len() as u32, MaterialId(materials.len() as u32));
         let name = format!("part {}", id.0);
-        mesh.parts.push(Part { name, first: mesh.triangles.len() as u32, count: triangles.len() as u32 });
+        let (first_triangle, count) = (mesh.triangles.len() as u32, triangles.len() as u32);
+        mesh.parts.push(Part { name, first: first_triangle, count, source: None });
         materials.push(material.clone());
         mesh.positions.extend(points);
         mesh.normals.extend(normals);

@@ -35,6 +35,20 @@ pub struct Part {
     pub first: u32,
     /// Number of triangles.
     pub count: u32,
+    /// Which node of the file, and which primitive of its mesh; `None` for a part that no file holds.
+    pub source: Option<[u32; 2]>,
+}
+
+impl Part {
+    /// Where it stands in the file, as messages say it.
+    pub fn place(&self) -> String {
+        match self.source {
+            Some([node, primitive]) => {
+                format!("nodes[{node}].mesh.primitives[{primitive}] \"{}\"", self.name)
+            }
+            None => format!("part \"{}\"", self.name),
+        }
+    }
 }
 
 impl Mesh {

@@ -65,7 +65,7 @@ fn slivers(mesh: &Mesh, part: &Part, found: &mut Vec<Finding>) {
         found.push(Finding {
             severity: Severity::Doubtful,
             kind: "faces",
-            place: format!("node \"{}\"", part.name),
+            place: part.place(),
             problem: format!("{count} of {} triangles are needles, 10000 times longer than high", part.count),
             remedy: "merge vertices by distance and triangulate anew",
         });
@@ -100,7 +100,7 @@ fn facets(mesh: &Mesh, part: &Part, found: &mut Vec<Finding>) {
         found.push(Finding {
             severity: Severity::Doubtful,
             kind: "normals",
-            place: format!("node \"{}\"", part.name),
+            place: part.place(),
             problem: format!("it looks curved, but its {} triangles have no smooth normals", part.count),
             remedy: "export smooth normals (Blender: Shade Auto Smooth, and Normals in the glTF export)",
         });

@@ -9,7 +9,7 @@ mod light;
 mod rooms;
 
 use geometry::gltf::Loaded;
-use geometry::{Mesh, World};
+use geometry::{Mesh, Part, World};
 use serde::Serialize;
 use std::collections::HashMap;
 
@@ -20,7 +20,7 @@ pub struct Finding {
     pub severity: Severity,
     /// Which kind: "glass", "albedo", "light", "faces", "normals", "room" or "camera".
     pub kind: &'static str,
-    /// Where in the file.
+    /// Where in the file: a JSON path and the name there.
     pub place: String,
     /// What is wrong, with its numbers.
     pub problem: String,
@@ -83,7 +83,7 @@ fn shorten(found: Vec<Finding>) -> Vec<Finding> {
 fn node_of(mesh: &Mesh, triangle: u32) -> String {
     let after = mesh.parts.partition_point(|p| p.first <= triangle);
     let part = after.checked_sub(1).and_then(|i| mesh.parts.get(i));
-    part.map_or_else(|| "the mesh".into(), |p| format!("node \"{}\"", p.name))
+    part.map_or_else(|| "the mesh".into(), Part::place)
 }
 
 #[cfg(test)]

@@ -48,7 +48,7 @@ pub fn examine(world: &World, found: &mut Vec<Finding>) {
                 }
             }
             for (part, _) in seen.into_iter().filter(|(_, n)| *n >= ENOUGH) {
-                let wall = format!("node \"{}\"", mesh.parts[part as usize].name);
+                let wall = mesh.parts[part as usize].place();
                 *walls.entry((node_of(mesh, t), wall)).or_default() += 1;
             }
         }

@@ -25,7 +25,7 @@ fn block(scene: &mut Scene, name: &str, lo: Vec3, hi: Vec3, m: u32, inward: bool
     }
     let count = mesh.triangles.len() as u32 - first;
     mesh.materials.resize(mesh.triangles.len(), MaterialId(m));
-    mesh.parts.push(Part { name: name.into(), first, count });
+    mesh.parts.push(Part { name: name.into(), first, count, source: None });
 }
 
 /// A room of 4 m with a lamp under its ceiling; materials: paint, lamp, glass.

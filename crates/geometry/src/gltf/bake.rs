@@ -28,7 +28,7 @@ pub(super) fn append(
     is_last: bool,
     world: &DAffine3,
     material: MaterialId,
-    name: String,
+    (name, source): (String, [u32; 2]),
     layout: Layout,
 ) -> u64 {
     let base = mesh.positions.len();
@@ -47,7 +47,7 @@ pub(super) fn append(
         if sign < 0.0 { [corner(a), corner(c), corner(b)] } else { [corner(a), corner(b), corner(c)] }
     });
     mesh.materials.resize(mesh.triangles.len(), material);
-    mesh.parts.push(Part { name, first: first as u32, count });
+    mesh.parts.push(Part { name, first: first as u32, count, source: Some(source) });
 
     let replaced = if !has_normals {
         mesh.normals.resize(mesh.positions.len(), Vec3::ZERO);
@@ -161,9 +161,9 @@ mod tests {
         let layout = Layout { uvs: [true, false], colors: true, tangents: true };
         // In two copies; as the only one the primitive gives up its arrays, with the same result.
         let at = DAffine3::from_scale(scale);
-        let n = append(&mut mesh, &mut copy(p), false, &at, MaterialId(0), "x".into(), layout);
+        let n = append(&mut mesh, &mut copy(p), false, &at, MaterialId(0), ("x".into(), [0; 2]), layout);
         let mut only = Mesh::default();
-        append(&mut only, &mut copy(p), true, &at, MaterialId(0), "x".into(), layout);
+        append(&mut only, &mut copy(p), true, &at, MaterialId(0), ("x".into(), [0; 2]), layout);
         assert_eq!((&only.positions, &only.triangles), (&mesh.positions, &mesh.triangles));
         (mesh, n)
     }

@@ -186,7 +186,12 @@ mod tests {
             scene.mesh.normals.extend([Vec3::Z; 3]);
             scene.mesh.triangles.push([0, 1, 2].map(|k| (3 * t + k) as u32));
             scene.mesh.materials.push(MaterialId(materials[t]));
-            scene.mesh.parts.push(Part { name: format!("part {t}"), first: t as u32, count: 1 });
+            scene.mesh.parts.push(Part {
+                name: format!("part {t}"),
+                first: t as u32,
+                count: 1,
+                source: None,
+            });
         }
         scene
     }

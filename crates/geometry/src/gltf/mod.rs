@@ -284,7 +284,8 @@ fn build(
                 triangles += primitive.triangles.len() as u64 * places.len() as u64;
                 document.within(&at, "triangles", triangles, limit)?;
                 for (k, (node, world)) in places.iter().enumerate() {
-                    let (name, last) = (nodes::name(root, *node), k + 1 == places.len());
+                    let name = (nodes::name(root, *node), [*node as u32, p as u32]);
+                    let last = k + 1 == places.len();
                     let mesh = &mut scene.mesh;
                     let replaced = bake::append(mesh, &mut primitive, last, world, material, name, layout);
                     warnings.count("normals replaced by that of a face: zero or not finite", &at, replaced);

@@ -15,7 +15,7 @@ fn scene(material: Material) -> Scene {
         positions,
         triangles: vec![[0, 1, 2]],
         materials: vec![MaterialId(0)],
-        parts: vec![Part { name: "t".into(), first: 0, count: 1 }],
+        parts: vec![Part { name: "t".into(), first: 0, count: 1, source: None }],
         ..Mesh::default()
     };
     Scene { mesh, materials: vec![material], ..Scene::default() }
