@@ -6,7 +6,7 @@ use super::error::Error;
 use super::warnings::Warnings;
 
 /// Modelled, wherever the file uses them.
-const MODELLED: [&str; 24] = [
+const MODELLED: [&str; 25] = [
     "EXT_lights_ies",
     "EXT_lights_image_based",
     "EXT_mesh_gpu_instancing",
@@ -30,6 +30,7 @@ const MODELLED: [&str; 24] = [
     "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_meshopt_compression",
+    "KHR_texture_basisu",
     "KHR_texture_transform",
 ];
 
@@ -69,8 +70,7 @@ pub(super) fn refusal(file: &Path, name: &str) -> Error {
 
 fn remedy(name: &str) -> &'static str {
     match name {
-        "KHR_texture_basisu" => "export it again with PNG, JPEG or WebP textures instead of KTX2",
-        "MSFT_texture_dds" => "export it again with PNG, JPEG or WebP textures instead of DDS",
+        "MSFT_texture_dds" => "export it again with PNG, JPEG, WebP or KTX2 textures instead of DDS",
         _ => {
             "export it again without this extension, or list it in extensionsUsed only if the file can do without"
         }
@@ -88,7 +88,7 @@ mod tests {
 
     #[test]
     fn unknown_requirements_are_refused_by_name_with_a_remedy() {
-        for name in ["KHR_texture_basisu", "MSFT_texture_dds", "ACME_magic"] {
+        for name in ["MSFT_texture_dds", "ACME_magic"] {
             let message = verdict(name).expect_err(name).to_string();
             assert!(message.contains(name) && message.contains("export"), "{message}");
         }

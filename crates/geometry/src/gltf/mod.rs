@@ -16,6 +16,7 @@ mod environment;
 mod error;
 mod extensions;
 mod instancing;
+mod ktx2;
 mod lights;
 mod limits;
 mod lobes;

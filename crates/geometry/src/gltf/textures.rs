@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use super::document::Document;
 use super::error::{Error, chain};
+use super::ktx2;
 use super::limits::Limits;
 use super::materials::texture_refs;
 use super::warnings::Warnings;
@@ -155,17 +156,19 @@ impl Sampler {
     }
 }
 
-/// The image of texture `i`: WebP where the file offers it, for the other is a fallback of less quality.
+/// The image of texture `i`: WebP where the file offers it, for the other is a fallback of less quality; KTX2 where there
+/// is no other, for it loses most.
 fn image_of(document: &Document, i: usize, warnings: &mut Warnings) -> Result<Option<usize>, Error> {
     let texture = &document.root.textures[i];
     let others = texture.extensions.as_ref().map(|e| &e.others);
-    let webp =
-        others.and_then(|o| o.get("EXT_texture_webp")).and_then(|e| e.get("source")).and_then(|s| s.as_u64());
-    let plain = texture.source.value();
-    let image = match webp.and_then(|s| usize::try_from(s).ok()) {
+    let source = |extension: &str| -> Option<usize> {
+        usize::try_from(others?.get(extension)?.get("source")?.as_u64()?).ok()
+    };
+    // The gltf crate's sign for no source.
+    let plain = Some(texture.source.value()).filter(|image| *image != u32::MAX as usize);
+    let image = match source("EXT_texture_webp").or(plain).or(source("KHR_texture_basisu")) {
         Some(image) => image,
-        // The gltf crate's sign for no source.
-        None if plain == u32::MAX as usize => {
+        None => {
             let kinds: Vec<&str> = others.into_iter().flat_map(|o| o.keys().map(String::as_str)).collect();
             let why = if kinds.is_empty() {
                 "it has no image".into()
@@ -175,7 +178,6 @@ fn image_of(document: &Document, i: usize, warnings: &mut Warnings) -> Result<Op
             warnings.say(format!("textures[{i}] is left out: {why}"));
             return Ok(None);
         }
-        None => plain,
     };
     if image >= document.root.images.len() {
         return Err(document.fault(
@@ -228,6 +230,9 @@ impl Source {
 
     /// Columns and rows from the header.
     fn size(&self) -> Result<(u32, u32), String> {
+        if ktx2::is_ktx2(&self.bytes) {
+            return ktx2::size(&self.bytes);
+        }
         let reader =
             ImageReader::new(Cursor::new(&self.bytes)).with_guessed_format().map_err(|e| e.to_string())?;
         reader.into_dimensions().map_err(|e| e.to_string())
@@ -236,13 +241,20 @@ impl Source {
     fn decode(self) -> Result<Texture, String> {
         let Some(pixels) = self.pixels else { return Err(String::new()) };
         let failed = |e: &dyn std::fmt::Display| format!("image \"{}\" is left out: {e}", self.name);
-        let reader = ImageReader::new(Cursor::new(&self.bytes)).with_guessed_format();
-        let mut reader = reader.map_err(|e| failed(&e))?;
         // The size has been judged; what is left is room for its texels, at most 4 × 32 bits, and some more.
-        let mut limits = image::Limits::default();
-        limits.max_alloc = Some(16 * pixels + (64 << 20));
-        reader.limits(limits);
-        let rgba = reader.decode().map_err(|e| failed(&e))?.into_rgba8();
+        let most = 16 * pixels + (64 << 20);
+        let rgba = if ktx2::is_ktx2(&self.bytes) {
+            let (width, height) = self.size().map_err(|e| failed(&e))?;
+            let texels = ktx2::decode(&self.bytes, most).map_err(|e| failed(&e))?;
+            image::RgbaImage::from_raw(width, height, texels).ok_or_else(|| failed(&"too few texels"))?
+        } else {
+            let reader = ImageReader::new(Cursor::new(&self.bytes)).with_guessed_format();
+            let mut reader = reader.map_err(|e| failed(&e))?;
+            let mut limits = image::Limits::default();
+            limits.max_alloc = Some(most);
+            reader.limits(limits);
+            reader.decode().map_err(|e| failed(&e))?.into_rgba8()
+        };
         let (width, height) = rgba.dimensions();
         let texels = rgba.as_raw().as_chunks::<4>().0.to_vec();
         let Sampler { wrap_s, wrap_t, linear } = self.sampler;
@@ -346,6 +358,28 @@ mod tests {
         assert!(textures.is_empty() && warnings.iter().any(|w| w.contains("30 × 20")), "{warnings:?}");
         let limits = Limits { total_pixels: 700, ..Limits::default() };
         assert_eq!(load_all(&json(bytes.len()), bytes, limits).0.len(), 1);
+    }
+
+    /// KTX2 by its extension; where there is a PNG too, that; and a file cut short is a warning.
+    #[test]
+    fn ktx2_is_read_where_there_is_nothing_else() {
+        let (ktx2, png) = (include_bytes!("testdata/uastc.ktx2"), png(3, 2));
+        let (n, cut) = (ktx2.len(), ktx2.len() - 20);
+        let json = format!(
+            r#""bufferViews":[{{"buffer":0,"byteLength":{n}}},{{"buffer":0,"byteOffset":{n},"byteLength":{}}},{{"buffer":0,"byteLength":{cut}}}],
+            "images":[{{"bufferView":0,"mimeType":"image/ktx2"}},{{"bufferView":1,"mimeType":"image/png"}},{{"bufferView":2,"mimeType":"image/ktx2","name":"cut"}}],
+            "textures":[{{"extensions":{{"KHR_texture_basisu":{{"source":0}}}}}},{{"source":1,"extensions":{{"KHR_texture_basisu":{{"source":0}}}}}},
+            {{"extensions":{{"KHR_texture_basisu":{{"source":2}}}}}}]"#,
+            png.len()
+        );
+        let (textures, materials, warnings) =
+            load_all(&json, [&ktx2[..], &png[..]].concat(), Limits::default());
+        let sizes: Vec<(u32, u32)> = textures.iter().map(|t| (t.width, t.height)).collect();
+        assert_eq!(sizes, [(16, 8), (3, 2)], "{warnings:?}");
+        assert!(
+            materials[2].emissive_texture.is_none() && warnings.concat().contains("\"cut\""),
+            "{warnings:?}"
+        );
     }
 
     #[test]
