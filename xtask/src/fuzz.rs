@@ -29,6 +29,9 @@ pub struct Args {
     /// Seed
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Write the sound files into this folder, for the cargo-fuzz targets of tests/fuzz, and do no more
+    #[arg(long)]
+    corpus: Option<PathBuf>,
     /// Load this one file and say what came of it
     #[arg(long)]
     replay: Option<PathBuf>,
@@ -49,6 +52,9 @@ pub fn run(args: Args) -> Result<()> {
     std::fs::create_dir_all(&folder)?;
     let seeds = seeds::all(&args.files)?;
     anyhow::ensure!(!seeds.is_empty(), "nothing to spoil");
+    if let Some(corpus) = &args.corpus {
+        return seeds::write(&seeds, corpus);
+    }
     // A panic is what we look for: caught in the loader, its trace would only drown the rest.
     std::panic::set_hook(Box::new(|_| {}));
     let start = Instant::now();

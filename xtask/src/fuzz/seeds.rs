@@ -2,6 +2,7 @@
 
 use super::spoil::Seed;
 use crate::base64;
+use crate::scenes::downlight;
 use anyhow::Result;
 use std::path::{Path, PathBuf};
 
@@ -25,6 +26,25 @@ pub fn all(files: &[PathBuf]) -> Result<Vec<Seed>> {
         }
     }
     Ok(seeds)
+}
+
+/// Writes `seeds` as the targets of `tests/fuzz` read them: JSON, or JSON, a zero byte and the binary chunk; and a
+/// photometric file.
+pub fn write(seeds: &[Seed], corpus: &Path) -> Result<()> {
+    for folder in ["gltf", "glb", "ies"] {
+        std::fs::create_dir_all(corpus.join(folder))?;
+    }
+    for (i, seed) in seeds.iter().enumerate() {
+        match seed {
+            Seed::Gltf(json) => std::fs::write(corpus.join("gltf").join(format!("{i}")), json)?,
+            Seed::Glb { json, bin } => {
+                let parts = [json, &b"\0"[..], bin].concat();
+                std::fs::write(corpus.join("glb").join(format!("{i}")), parts)?;
+            }
+        }
+    }
+    std::fs::write(corpus.join("ies/0"), downlight::downlight())?;
+    Ok(())
 }
 
 fn is_gltf(path: &Path) -> bool {
