@@ -55,6 +55,9 @@ pub(crate) struct Refiner<'a> {
     pub(crate) field: Field,
     /// E at the sites, lx.
     pub(crate) e: Vec<Rgb>,
+    /// About the irradiance straight from the emitters at the sites, lx: an error of E is seen beside it. Black where lamps
+    /// are kept apart, for they may be put out.
+    pub(crate) lit: Vec<Rgb>,
     /// For each piece, whether any of it reflects diffusely: mirrors and glass need no irradiance.
     diffuse: Vec<bool>,
     /// Lights whose parts are kept apart.
@@ -134,6 +137,7 @@ impl<'a> Refiner<'a> {
             reach,
             field: Field::default(),
             e: Vec::new(),
+            lit: Vec::new(),
             groups: config.by_light.then(|| LightGroups::new(world)),
             unresolved: Vec::new(),
             weights: Vec::new(),
@@ -218,7 +222,8 @@ impl<'a> Refiner<'a> {
             let values = self.field.spread(&self.e);
             let around =
                 self.levels(self.field.sites.iter().zip(&self.e).map(|(s, e)| (s.vertex, s.side, e.mean())));
-            let errors: Vec<[f32; 2]> = tests.iter().map(|t| self.error(t, &values, &around)).collect();
+            let lit = self.field.spread(&self.lit);
+            let errors: Vec<[f32; 2]> = tests.iter().map(|t| self.error(t, &values, &lit, &around)).collect();
             rough.resize(self.elements.vertices.len(), false);
             let mut failed = vec![false; self.elements.vertices.len()];
             for (test, &[error, rough_error]) in tests.iter().zip(&errors) {
@@ -282,7 +287,9 @@ impl<'a> Refiner<'a> {
         let around =
             self.levels(self.field.sites.iter().zip(&self.e).map(|(s, e)| (s.vertex, s.side, e.mean())));
         let elsewhere = self.means_of_faces();
-        let promise = |difference: f32, level: f32, slot: usize| match level + elsewhere[self.face_slot(slot)]
+        let lit = self.field.spread(&self.lit);
+        let promise = |difference: f32, level: f32, lit: f32, slot: usize| match level
+            + elsewhere[self.face_slot(slot)]
         {
             // Without indirect light there may be the direct one, for those who take it from the vertices.
             0.0 => {
@@ -292,7 +299,7 @@ impl<'a> Refiner<'a> {
                     0.0
                 }
             }
-            near => (difference + HIDDEN * near) / (level + 0.1 * around[self.face_slot(slot)]),
+            near => (difference + HIDDEN * near) / (level + lit + 0.1 * around[self.face_slot(slot)]),
         };
         let change = |a: VertexId, b: VertexId| {
             let face = self.elements.vertices[a as usize].face;
@@ -306,7 +313,8 @@ impl<'a> Refiner<'a> {
                     * match (self.field.usable(sa), self.field.usable(sb)) {
                         (true, true) => {
                             let (va, vb) = (values[sa], values[sb]);
-                            promise((va - vb).map(f32::abs).mean(), 0.5 * (va + vb).mean(), sa)
+                            let lit = lit[sa].mean().min(lit[sb].mean());
+                            promise((va - vb).map(f32::abs).mean(), 0.5 * (va + vb).mean(), lit, sa)
                         }
                         // A buried end says nothing of the rest.
                         _ => 1.0,
@@ -316,7 +324,8 @@ impl<'a> Refiner<'a> {
         let around = |v: VertexId| {
             let of = |&side: &Side| {
                 let s = slot(v, side);
-                self.weight(s) * promise(self.field.spread_around(s, &self.e), values[s].mean(), s)
+                self.weight(s)
+                    * promise(self.field.spread_around(s, &self.e), values[s].mean(), lit[s].mean(), s)
             };
             Side::BOTH.iter().filter(|&&side| self.field.usable(slot(v, side))).map(of).fold(0.0, f32::max)
         };
@@ -374,7 +383,8 @@ impl<'a> Refiner<'a> {
 
     /// Relative difference of what was gathered from what was predicted, the worse side: by what it matters, and as such
     /// where it stands out of the rays' noise (the two of [`ROUGH`]).
-    fn error(&self, test: &Test, values: &[Rgb], around: &[f32]) -> [f32; 2] {
+    fn error(&self, test: &Test, values: &[Rgb], lit: &[Rgb], around: &[f32]) -> [f32; 2] {
+        let here_lit = |side| lit[slot(test.vertex, side)].mean();
         Side::BOTH
             .iter()
             .filter(|side| test.sides[side.index()] && self.field.usable(slot(test.vertex, **side)))
@@ -394,7 +404,10 @@ impl<'a> Refiner<'a> {
                 // What the rays' own noise explains is no bend of the light.
                 let noise = known_variance / (weight * weight) + self.field.variance(slot(test.vertex, side));
                 let floor = 0.1 * around[self.face_slot(slot(test.vertex, side))];
-                let level = (0.5 * (got + predicted).mean() + floor).max(1e-30);
+                // The least that shines on any of them: one in the shadow is seen by its indirect light alone.
+                let lit = test.from.iter().map(|(v, _)| lit[slot(*v, side)].mean());
+                let lit = lit.fold(here_lit(side), f32::min);
+                let level = (0.5 * (got + predicted).mean() + lit + floor).max(1e-30);
                 let beyond = |noise: f32| (difference * difference - noise).max(0.0).sqrt() / level;
                 [self.weight(slot(test.vertex, side)) * beyond(noise), beyond(STANDS_OUT * noise)]
             })

@@ -13,6 +13,8 @@ use std::collections::HashMap;
 
 /// Origins that one vertex's rays are shared among, at most.
 const FACETS: usize = 16;
+/// Light samples that tell how bright a site is besides what it gathers.
+const GLANCES: u32 = 4;
 /// Rows in one record of a journal: what is lost when a solve is cut off.
 const RECORD: usize = 256;
 
@@ -28,6 +30,7 @@ impl Refiner<'_> {
             .filter(|&(v, side)| self.reach.alive(self.elements.vertices[v as usize].face, side))
             .filter(|(v, _)| origins.contains_key(v))
             .collect();
+        let lit = self.glance(&jobs, &origins);
         let mut rays = self.config.rays;
         let mut rows = self.gather_rows(&jobs, &origins, |s| self.rays_for(s));
         // Where few rays find the light (a sunny patch, a lamp behind a shade) it takes more of them.
@@ -40,7 +43,8 @@ impl Refiner<'_> {
                 let (row, (v, side)) = (&rows[*i], jobs[*i]);
                 let s = slot(v, side);
                 self.weight(s) * row.variance.sqrt()
-                    > self.config.noise * (row.direct.mean() + 0.1 * around[self.face_slot(s)])
+                    > self.config.noise
+                        * (row.direct.mean() + lit[*i].mean() + 0.1 * around[self.face_slot(s)])
             };
             let which: Vec<usize> = (0..rows.len()).filter(noisy).collect();
             if which.is_empty() || self.progress.stopped() {
@@ -51,6 +55,7 @@ impl Refiner<'_> {
                 rows[i] = row;
             }
         }
+        self.lit.extend(lit);
         self.e.extend(rows.iter().map(|row| row.direct));
         let sites = jobs.into_iter().zip(rows).map(|((vertex, side), row)| Site {
             vertex,
@@ -60,6 +65,20 @@ impl Refiner<'_> {
         });
         self.field.sites.extend(sites);
         self.field.connect(self.world, &self.elements, self.radius);
+    }
+
+    /// About the direct irradiance at `jobs`, lx: see [`Refiner::lit`].
+    fn glance(&self, jobs: &[(VertexId, Side)], origins: &HashMap<VertexId, Vec<Origin>>) -> Vec<Rgb> {
+        if self.groups.is_some() {
+            return vec![Rgb::BLACK; jobs.len()];
+        }
+        let at = |&(vertex, side): &(VertexId, Side)| {
+            let turned = turned(&origins[&vertex], side);
+            let normal = self.elements.vertices[vertex as usize].normal * side.sign();
+            let stream = slot(vertex, side) as u64;
+            gather::direct(self.world, &turned, normal, GLANCES, !self.config.seed, stream, |_, _| ())
+        };
+        jobs.par_iter().map(at).collect()
     }
 
     /// Rays that a slot gets at first. What nobody sees is averaged over many sites before it shows.
