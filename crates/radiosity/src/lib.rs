@@ -36,6 +36,7 @@ pub mod gather;
 pub mod importance;
 mod influence;
 pub mod journal;
+mod levels;
 mod lights;
 pub mod patch_to_vertex;
 pub mod patches;

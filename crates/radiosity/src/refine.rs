@@ -28,10 +28,6 @@ const ROUGH: f32 = 0.15;
 /// Times the variance of the noise that such a difference is to exceed: two standard deviations. With one, the gallery's
 /// pixels gathered for themselves wherever 80 rays a site happened to differ.
 const STANDS_OUT: f32 = 4.0;
-/// A face with fewer sites than this does not tell how much light there is around it.
-const FEW: u32 = 16;
-/// What is this much darker than the mean of all is dark, whoever looks.
-const DARK: f32 = 0.01;
 /// Elements (of h0² each) that the first mesh may have, about.
 const FIRST_ELEMENTS: f32 = 10_000.0;
 /// A round for fewer new sites than one in so many is not worth its while.
@@ -46,7 +42,7 @@ pub(crate) const INWARD: f32 = 0.02;
 pub(crate) struct Refiner<'a> {
     pub(crate) world: &'a World,
     pub(crate) config: &'a Config,
-    importance: Option<&'a Importance>,
+    pub(crate) importance: Option<&'a Importance>,
     /// Rows that were gathered before, and where they are kept.
     pub(crate) journal: Option<&'a Mutex<Journal>>,
     pub(crate) progress: &'a dyn Progress,
@@ -55,8 +51,8 @@ pub(crate) struct Refiner<'a> {
     pub(crate) field: Field,
     /// E at the sites, lx.
     pub(crate) e: Vec<Rgb>,
-    /// About the irradiance straight from the emitters at the sites, lx: an error of E is seen beside it. Black where lamps
-    /// are kept apart, for they may be put out.
+    /// About the irradiance straight from the emitters at the sites, lx: an error of E is seen beside it. Black where
+    /// nobody looks yet: who measures the indirect light alone, or puts lamps out, may be next.
     pub(crate) lit: Vec<Rgb>,
     /// For each piece, whether any of it reflects diffusely: mirrors and glass need no irradiance.
     diffuse: Vec<bool>,
@@ -349,36 +345,6 @@ impl<'a> Refiner<'a> {
             kept.iter().filter_map(edge).map(|(edge, _)| edge).collect(),
             all.iter().filter_map(member).collect(),
         )
-    }
-
-    /// How much light there is on each side of each face, lx, for telling what is dark there: the mean over its sites, or over
-    /// all of them where it has few. A dim room beside a bright one is looked at by eyes and cameras that are used to it.
-    pub(crate) fn levels(&self, sites: impl Iterator<Item = (VertexId, Side, f32)>) -> Vec<f32> {
-        let mut sums = vec![(0.0, 0u32); 2 * self.elements.faces as usize];
-        let (mut all, mut count) = (0f64, 0u32);
-        for (vertex, side, e) in sites {
-            let sum = &mut sums[self.face_slot(slot(vertex, side))];
-            *sum = (sum.0 + e, sum.1 + 1);
-            (all, count) = (all + f64::from(e), count + 1);
-        }
-        let all = (all / f64::from(count.max(1))) as f32;
-        let level = |(sum, n): (f32, u32)| if n >= FEW { (sum / n as f32).max(DARK * all) } else { all };
-        sums.into_iter().map(level).collect()
-    }
-
-    /// Mean E of each side of each face, lx, over its sites.
-    fn means_of_faces(&self) -> Vec<f32> {
-        let mut sums = vec![(0.0, 0u32); 2 * self.elements.faces as usize];
-        for (site, e) in self.field.sites.iter().zip(&self.e) {
-            let sum = &mut sums[self.face_slot(slot(site.vertex, site.side))];
-            *sum = (sum.0 + e.mean(), sum.1 + 1);
-        }
-        sums.into_iter().map(|(sum, n)| sum / n.max(1) as f32).collect()
-    }
-
-    /// Number of the side of a face that a slot lies on.
-    pub(crate) fn face_slot(&self, slot: usize) -> usize {
-        2 * self.elements.vertices[slot / 2].face as usize + slot % 2
     }
 
     /// Relative difference of what was gathered from what was predicted, the worse side: by what it matters, and as such

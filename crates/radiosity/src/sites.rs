@@ -14,7 +14,7 @@ use std::collections::HashMap;
 /// Origins that one vertex's rays are shared among, at most.
 const FACETS: usize = 16;
 /// Light samples that tell how bright a site is besides what it gathers.
-const GLANCES: u32 = 4;
+const GLANCES: u32 = 16;
 /// Rows in one record of a journal: what is lost when a solve is cut off.
 const RECORD: usize = 256;
 
@@ -69,7 +69,7 @@ impl Refiner<'_> {
 
     /// About the direct irradiance at `jobs`, lx: see [`Refiner::lit`].
     fn glance(&self, jobs: &[(VertexId, Side)], origins: &HashMap<VertexId, Vec<Origin>>) -> Vec<Rgb> {
-        if self.groups.is_some() {
+        if self.importance.is_none() {
             return vec![Rgb::BLACK; jobs.len()];
         }
         let at = |&(vertex, side): &(VertexId, Side)| {

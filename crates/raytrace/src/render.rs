@@ -97,6 +97,10 @@ impl Default for Settings {
     }
 }
 
+/// Pixels for which one site is enough, where the first pass may have so many sites.
+const PIXELS_OF_A_SITE: usize = 2;
+/// Sites it may have at least: what is not seen lights what is.
+const LEAST_SITES: usize = 16_000;
 /// Of the square of the error asked, the share that samples may leave as noise; the rest is for the first pass.
 const NOISE_SHARE: f32 = 0.5;
 /// What the first pass is asked for, in units of the error asked.
@@ -214,6 +218,11 @@ pub fn prepass_resumable(
     let watch = Watch { progress, deadline };
     if let Some(config) = &settings.classical {
         return classical::solve(world, config, &watch);
+    }
+    if !cameras.is_empty() {
+        // Light finer than the pixels is not seen.
+        let pixels = settings.width as usize * settings.height as usize * cameras.len();
+        config.most_sites = config.most_sites.min((pixels / PIXELS_OF_A_SITE).max(LEAST_SITES));
     }
     let aspect = settings.width as f32 / settings.height.max(1) as f32;
     let matters = (!cameras.is_empty()).then(|| importance(world, cameras, aspect));

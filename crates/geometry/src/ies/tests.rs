@@ -1,3 +1,5 @@
+//! Photometric webs: files of every kind, and closed forms.
+
 use super::*;
 use crate::sampling::Rng;
 

@@ -29,7 +29,7 @@ pub fn emission_at(scene: &Scene, hit: &Hit, front: bool) -> Rgb {
 /// Share of light that goes on along `ray` as if nothing were there: what the coverage leaves, and of the rest what a
 /// smooth thin wall (or a volume with the index of its surroundings) lets pass. Black for an opaque surface.
 ///
-/// Absorption inside a volume is not in it; see [`super::Surface::interior`].
+/// Absorption inside a volume is not in it; see [`super::Surface::before`].
 pub fn straight_through(scene: &Scene, ray: &Ray, hit: &Hit) -> Rgb {
     let point = Point::new(scene, hit.triangle, hit.u, hit.v);
     if !point.material.may_pass_straight() {
