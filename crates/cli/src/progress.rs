@@ -58,10 +58,10 @@ impl Bars {
         let _ = ctrlc::set_handler(handler);
     }
 
-    /// From now on Ctrl-C ends the process with these words: for work that is kept as it goes.
-    pub fn end_at_interrupts(&self, words: &'static str) {
+    /// From now on Ctrl-C ends the process with the words that are true then: for work that is kept as it goes.
+    pub fn end_at_interrupts(&self, words: impl Fn() -> &'static str + Send + 'static) {
         let _ = ctrlc::set_handler(move || {
-            eprintln!("\n{words}");
+            eprintln!("\n{}", words());
             std::process::exit(130);
         });
     }

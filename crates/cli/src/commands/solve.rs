@@ -27,7 +27,11 @@ pub fn run(args: &SolveArgs) -> Result<ExitCode> {
     check_writable(&args.output)?;
     let bars = Bars::new(args.run.quiet);
     start_threads(args.run.threads)?;
-    bars.end_at_interrupts("stopped: the same command goes on from here");
+    let kept = partial(&args.output);
+    bars.end_at_interrupts(move || match kept.is_file() {
+        true => "stopped: the same command goes on from here",
+        false => "stopped: nothing is kept, the same command begins anew",
+    });
 
     let Room { world, cameras, warnings, mut stages } =
         Room::open(&args.scene, &args.which, &args.light, &bars)?;

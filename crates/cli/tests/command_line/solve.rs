@@ -186,6 +186,40 @@ fn a_file_that_is_not_what_was_written_is_refused() {
 }
 
 /// Killed at many moments, a solve never leaves half a file, and goes on to the same bytes.
+/// Where the rows cannot be kept, for a folder is in the way, Ctrl-C promises nothing.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_solve_promises_what_is_kept() {
+    let dir = folder();
+    room(dir.path());
+    let interrupted = || {
+        let child = Command::new(assert_cmd::cargo::cargo_bin("twolight"))
+            .args(["solve", "room.gltf", "-o", "room.twl", "--error", "0.3%", "--quiet"])
+            .current_dir(dir.path())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("it starts");
+        // Until there are rows to keep, or would be.
+        for _ in 0..200 {
+            std::thread::sleep(Duration::from_millis(10));
+            if dir.path().join("room.twl.partial").is_file() {
+                break;
+            }
+        }
+        let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+        assert!(kill.is_ok_and(|status| status.success()), "it worked still");
+        let end = child.wait_with_output().expect("it ends");
+        assert_eq!(end.status.code(), Some(130));
+        String::from_utf8_lossy(&end.stderr).into_owned()
+    };
+    let said = interrupted();
+    assert!(said.contains("goes on from here"), "{said}");
+    fs::remove_file(dir.path().join("room.twl.partial")).expect("rows were kept");
+    fs::create_dir(dir.path().join("room.twl.partial")).expect("it is in the way");
+    let said = interrupted();
+    assert!(said.contains("nothing is kept"), "{said}");
+}
+
 #[test]
 fn a_killed_solve_goes_on_to_the_same_bytes() {
     let dir = folder();
