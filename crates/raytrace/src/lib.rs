@@ -29,6 +29,7 @@ pub mod film;
 pub mod flip;
 pub mod importance;
 pub mod integrator;
+pub mod level;
 pub mod measure;
 pub mod metrics;
 pub mod output;

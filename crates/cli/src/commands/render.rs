@@ -10,6 +10,7 @@ use crate::{cameras, solutions};
 use anyhow::{Context, Result};
 use geometry::Camera;
 use radiosity::Solution;
+use raytrace::level::level;
 use raytrace::tonemap::incident_exposure;
 use raytrace::{Integrator, Settings, prepass_for, render, render_by_light};
 use serde::Serialize;
@@ -138,7 +139,10 @@ impl<'a> Work<'a> {
         self.solve(&settings, &camera)?;
         // Frames that follow one another are exposed alike.
         let exposure = job.exposure.or_else(|| {
-            let level = shot.frame.and(self.solution.as_ref()).map(Solution::level);
+            let level = shot.frame.map(|_| match &self.solution {
+                Some(solution) => solution.level(),
+                None => level(&self.room.world),
+            });
             level.filter(|&e| e > 0.0).map(incident_exposure)
         });
         // An earlier preview is worth more than one that is half done.

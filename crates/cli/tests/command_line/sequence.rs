@@ -172,3 +172,20 @@ fn orbits_and_walks_are_numbered() {
         assert_eq!(render(dir.path(), wrong).status, 2, "{wrong:?}");
     }
 }
+
+/// Whatever part of the room is in view, by paths too: previews of a sequence share their exposure.
+#[test]
+fn a_sequence_by_paths_is_exposed_alike() {
+    let dir = folder();
+    moving(dir.path(), None);
+    let args =
+        ["render", "room.gltf", "-o", "a.##.exr", "--preview", "a.##.png", "--frames", "0..2", "--fps", "2"];
+    let more = ["--integrator", "path", "--spp", "2", "--size", "16x16", "--json", "--quiet"];
+    let run = twolight(dir.path(), &[&args[..], &more[..]].concat());
+    assert_eq!(run.status, 0, "{}", run.err);
+    let report: serde_json::Value = serde_json::from_str(&run.out).expect("it is JSON");
+    let pictures = report["pictures"].as_array().expect("pictures");
+    let exposures: Vec<f64> = pictures.iter().filter_map(|p| p["exposure"].as_f64()).collect();
+    assert!(exposures.len() > 1 && exposures.iter().all(|e| *e == exposures[0]), "{exposures:?}");
+    assert_eq!(exposures.len(), pictures.len());
+}
