@@ -25,7 +25,7 @@ pub fn level(world: &World) -> f32 {
         return 0.0;
     }
     let at = |i: u32| -> f32 {
-        let mut rng = Rng::new(0x6c65_7665_6c, u64::from(i));
+        let mut rng = Rng::new(0x006c_6576_656c, u64::from(i));
         let chosen = (f64::from(i / 2) + f64::from(rng.f32())) / f64::from(PLACES / 2) * sum;
         let t = sums.partition_point(|&s| s <= chosen).min(sums.len() - 1) as u32;
         let (u, v) = triangle(rng.vec2());
