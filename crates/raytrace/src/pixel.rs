@@ -216,8 +216,24 @@ fn one_surface(
     let count = g.hits.len() as f32;
     let part = count * share;
     let middle = g.hits.iter().map(|&i| hits[i].1.position).sum::<Vec3>() / count;
-    let nearest = |&&i: &&usize| hits[i].1.position.distance_squared(middle);
-    let chosen = g.hits.iter().min_by(|a, b| nearest(a).total_cmp(&nearest(b))).copied().unwrap_or(g.hits[0]);
+    let textured = varies(hybrid.world, g.key.material);
+    let albedo_of = |i: usize| hits[i].1.bsdf.diffuse_albedo(-hits[i].0.direction);
+    let covered: f32 = g.hits.iter().map(|&i| hits[i].1.coverage).sum();
+    let mean_albedo = if textured && g.hits.len() > 1 && covered > 0.0 {
+        g.hits.iter().map(|&i| albedo_of(i) * hits[i].1.coverage).sum::<Rgb>() / covered
+    } else {
+        albedo_of(g.hits[0])
+    };
+    // Not a black letter where most is white paper: it would tell nothing of the light.
+    let telling = |i: usize| {
+        !textured || albedo_of(i).luminance() * hits[i].1.coverage >= 0.5 * mean_albedo.luminance()
+    };
+    let order = |&i: &usize| (!telling(i), hits[i].1.position.distance_squared(middle));
+    let first = |a: &&usize, b: &&usize| {
+        let (a, b) = (order(a), order(b));
+        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+    };
+    let chosen = g.hits.iter().min_by(first).copied().unwrap_or(g.hits[0]);
     let (ray, surface) = &hits[chosen];
     let wo = -ray.direction;
     // A sliver of a pixel needs fewer shadow rays for the same noise in the pixel.
@@ -226,23 +242,14 @@ fn one_surface(
     let places: Vec<Vec3> = g.hits.iter().map(|&i| hits[i].1.position).collect();
     let (lit, plan) = hybrid.diffuse(surface, wo, quality, phase, &places, rng);
     let albedo = surface.bsdf.diffuse_albedo(wo);
-    let textured = varies(hybrid.world, surface.material);
-    let mean_albedo = if textured && g.hits.len() > 1 {
-        g.hits.iter().map(|&i| hits[i].1.bsdf.diffuse_albedo(-hits[i].0.direction)).sum::<Rgb>() / count
-    } else {
-        albedo
+    let (mean_albedo, coverage) = match textured && g.hits.len() > 1 {
+        true => (mean_albedo, covered * share),
+        false => (albedo, surface.coverage * part),
     };
-    // The texture is averaged over the pixel, the light on it is not.
-    let ratio = |m: f32, a: f32| if a > 1e-4 { m / a } else { 1.0 };
-    let tint = Rgb::new(
-        ratio(mean_albedo.r, albedo.r),
-        ratio(mean_albedo.g, albedo.g),
-        ratio(mean_albedo.b, albedo.b),
-    );
     let p = &mut shot.pixel;
-    let coverage = surface.coverage * part;
-    p.direct += lit.direct * tint * coverage;
-    p.indirect += lit.indirect * tint * coverage;
+    // The texture is averaged over the pixel, the light on it is not.
+    p.direct += retinted(lit.direct, albedo, mean_albedo, lit.straight) * coverage;
+    p.indirect += retinted(lit.indirect, albedo, mean_albedo, lit.irradiance - lit.straight) * coverage;
     p.irradiance += lit.irradiance * coverage;
     p.albedo += mean_albedo * part;
     let (mut sum, mut steps, mut before) = (Rgb::BLACK, 0.0, None);
@@ -276,6 +283,20 @@ fn one_surface(
         shot.sent = albedo.luminance() * surface.coverage / std::f32::consts::PI;
     }
     shot.specular |= surface.bsdf.has_specular() || surface.coverage < 1.0;
+}
+
+/// `light` sent back by a texel of `albedo`, as one of `mean` albedo would send it; where the texel is black in a channel,
+/// by the irradiance `e` there.
+fn retinted(light: Rgb, albedo: Rgb, mean: Rgb, e: Rgb) -> Rgb {
+    let channel = |light: f32, albedo: f32, mean: f32, e: f32| match albedo {
+        a if a > 1e-3 || a >= mean => light * if a > 0.0 { mean / a } else { 1.0 },
+        _ => mean * e * std::f32::consts::FRAC_1_PI,
+    };
+    Rgb::new(
+        channel(light.r, albedo.r, mean.r, e.r),
+        channel(light.g, albedo.g, mean.g, e.g),
+        channel(light.b, albedo.b, mean.b, e.b),
+    )
 }
 
 fn shot_alpha(alpha: f32) -> f32 {
