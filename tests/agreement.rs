@@ -3,12 +3,16 @@
 //! Each comparison: blocks of 8 × 8 pixels and the mean luminance, by the variance that both pictures state, and beyond
 //! it what the two passes are allowed: 1 % of the mean, and in a block a few per cent of its light.
 
-use geometry::{Camera, World};
+use geometry::math::Affine2;
+use geometry::texture::Wrap;
+use geometry::{Camera, Material, Texture, TextureRef, Vec2, Vec3, World};
 use raytrace::{Film, Settings};
 use std::sync::OnceLock;
 use support::blocks::compare;
+use support::build::{Build, parallel};
 use support::files::{asset, load, shared};
-use support::picture::{hybrid, mean, mean_of, path, shoot, shoot_with, solve};
+use support::picture::{hybrid, mean, mean_of, path, range, shoot, shoot_with, solve};
+use support::stuff::matt;
 
 /// Cornell box by paths, for several tests: 48 × 48, 256 paths a pixel, standard error of the mean 0.1 %.
 fn cornell() -> &'static (World, Camera, Film) {
@@ -96,4 +100,35 @@ fn another_renderer_sees_the_same_cornell_box() {
         theirs.pixels.iter().map(|p| f64::from(p.luminance())).sum::<f64>() / theirs.pixels.len() as f64;
     println!("cornell-measured: {} against {by_them}", mean(&ours));
     assert!((mean(&ours) / by_them - 1.0).abs() < 0.03, "{} against {by_them}", mean(&ours));
+}
+
+/// A floor of black and white texels, a few to a pixel, under an even sky of 10 cd/m²: every pixel shows about 5, and none
+/// is black because the ray nearest its middle met a black one.
+#[test]
+fn fine_print() {
+    let white = Material { base_color_texture: Some(print()), ..matt(1.0) };
+    let world = Build::new().level(0.0, [-1.0, -1.0], [1.0, 1.0], true, &white).sky(10.0).world();
+    let mut scene = world.scene;
+    scene.textures = vec![Texture {
+        name: "print".into(),
+        width: 2,
+        height: 2,
+        texels: vec![[0, 0, 0, 255], [255; 4], [255; 4], [0, 0, 0, 255]],
+        wrap_s: Wrap::Repeat,
+        wrap_t: Wrap::Repeat,
+        linear: false,
+    }];
+    // Texels of 7 mm, pixels of 25 mm.
+    scene.mesh.uvs[0] = scene.mesh.positions.iter().map(|p| Vec2::new(p.x, p.z) / 0.014).collect();
+    let world = World::new(scene);
+    let eye = parallel(Vec3::Y, Vec3::ZERO, 0.2, 0.0);
+    let film = shoot(&world, &eye, &hybrid(16, 16, 0.02));
+    let (low, high) = range(&film);
+    println!("fine print: {:.4}, {low:.3} to {high:.3}", mean(&film));
+    assert!((mean(&film) / 5.0 - 1.0).abs() < 0.01, "{}", mean(&film));
+    assert!(low > 2.5 && high < 7.5, "{low} to {high}");
+}
+
+fn print() -> TextureRef {
+    TextureRef { texture: 0, uv_set: 0, transform: Affine2::IDENTITY }
 }
