@@ -9,6 +9,7 @@
 //! then zero: whatever light falls on the mesh is on the fitted one.
 
 use geometry::{Rgb, Vec3};
+use rayon::prelude::*;
 use std::collections::HashMap;
 
 /// λ: what the jumps count. Enough to hold a vertex that few samples saw, and to take the noise of samples from what is
@@ -57,33 +58,24 @@ struct Row {
 
 /// The values of `unknowns` vertices that fit `observations` best; zero where nothing is known.
 pub fn fit(unknowns: usize, facets: &[Facet], observations: &[Observation]) -> Vec<Rgb> {
-    let mut rows = jumps(facets);
-    rows.extend(observations.iter().map(|o| {
-        let [a, b, c] = facets[o.facet as usize].unknowns;
-        let [u, v, w] = o.at.map(f64::from);
-        Row { unknowns: [a, b, c, c], factors: [u, v, w, 0.0], weight: f64::from(o.weight) }
-    }));
-    let seen = rows.len() - observations.len();
-    let mut diagonal = vec![0.0; unknowns];
-    for row in &rows {
-        for (&i, f) in row.unknowns.iter().zip(row.factors) {
-            diagonal[i as usize] += row.weight * f * f;
-        }
-    }
-    let mut right = vec![[0.0; 3]; unknowns];
-    let mut around = vec![0.0; unknowns];
-    for (row, o) in rows[seen..].iter().zip(observations) {
-        for (&i, f) in row.unknowns.iter().zip(row.factors) {
-            around[i as usize] += row.weight * f;
+    let rows = jumps(facets);
+    let (mut right, mut around) = (vec![[0.0; 3]; unknowns], vec![0.0; unknowns]);
+    let mut seen = vec![[[0.0; 3]; 3]; facets.len()];
+    for o in observations {
+        let (b, w) = (o.at.map(f64::from), f64::from(o.weight));
+        for (j, i) in facets[o.facet as usize].unknowns.into_iter().enumerate() {
+            around[i as usize] += w * b[j];
+            (0..3).for_each(|k| seen[o.facet as usize][j][k] += w * b[j] * b[k]);
             for (k, v) in o.value.to_array().into_iter().enumerate() {
-                right[i as usize][k] += row.weight * f * f64::from(v);
+                right[i as usize][k] += w * b[j] * f64::from(v);
             }
         }
     }
+    let matrix = Matrix::new(unknowns, facets, &seen, &rows);
     // From the mean of what was seen around each vertex.
     let start =
         right.iter().zip(&around).map(|(r, &a)| r.map(|r| if a > 0.0 { r / a } else { 0.0 })).collect();
-    let values = conjugate_gradients(&rows, &diagonal, &right, start);
+    let values = conjugate_gradients(&matrix, &right, start);
     values.into_iter().map(|v| Rgb::from(v.map(|v| v as f32))).collect()
 }
 
@@ -132,66 +124,120 @@ fn jump(a: &Facet, edge_a: usize, b: &Facet, edge_b: usize) -> Option<Row> {
     Some(Row { unknowns, factors, weight: SMOOTHNESS * area / norm2 })
 }
 
-/// Solves Σ rows · x = `right` for three channels at once, preconditioned by the diagonal. Serial, so that its sums do
-/// not depend on the number of threads: a few per cent of the time that the samples take.
-fn conjugate_gradients(
-    rows: &[Row],
-    diagonal: &[f64],
-    right: &[[f64; 3]],
-    mut x: Vec<[f64; 3]>,
-) -> Vec<[f64; 3]> {
-    let n = x.len();
-    let apply = |x: &[[f64; 3]]| {
-        let mut y = vec![[0.0; 3]; n];
-        for row in rows {
+/// The normal equations' matrix, row by row.
+struct Matrix {
+    /// Where each unknown's entries begin, and the end of the last.
+    begin: Vec<usize>,
+    columns: Vec<u32>,
+    entries: Vec<f64>,
+    diagonal: Vec<f64>,
+}
+
+impl Matrix {
+    /// The sum of each facet's `seen` and of the squares of all `rows`.
+    fn new(unknowns: usize, facets: &[Facet], seen: &[[[f64; 3]; 3]], rows: &[Row]) -> Matrix {
+        // Which of a facet's or row's corners an unknown is.
+        let mut meets = vec![Vec::new(); unknowns];
+        for (f, facet) in facets.iter().enumerate() {
+            facet.unknowns.iter().zip(0u8..).for_each(|(&i, k)| meets[i as usize].push((f as u32, k, true)));
+        }
+        for (r, row) in rows.iter().enumerate() {
+            row.unknowns.iter().zip(0u8..).for_each(|(&i, k)| meets[i as usize].push((r as u32, k, false)));
+        }
+        let lines: Vec<Vec<(u32, f64)>> = meets
+            .into_par_iter()
+            .map(|meets| {
+                let mut line = Vec::new();
+                for (of, k, is_facet) in meets {
+                    let (of, k) = (of as usize, k as usize);
+                    if is_facet {
+                        line.extend(facets[of].unknowns.into_iter().zip(seen[of][k]));
+                    } else {
+                        let row = &rows[of];
+                        let scale = row.weight * row.factors[k];
+                        line.extend(row.unknowns.into_iter().zip(row.factors.map(|f| scale * f)));
+                    }
+                }
+                line.sort_by_key(|e| e.0);
+                line.dedup_by(|b, a| {
+                    let same = a.0 == b.0;
+                    a.1 += if same { b.1 } else { 0.0 };
+                    same
+                });
+                line
+            })
+            .collect();
+        let mut matrix =
+            Matrix { begin: vec![0], columns: Vec::new(), entries: Vec::new(), diagonal: Vec::new() };
+        for (line, i) in lines.into_iter().zip(0u32..) {
+            matrix.diagonal.push(line.iter().find(|e| e.0 == i).map_or(0.0, |e| e.1));
+            matrix.columns.extend(line.iter().map(|e| e.0));
+            matrix.entries.extend(line.iter().map(|e| e.1));
+            matrix.begin.push(matrix.columns.len());
+        }
+        matrix
+    }
+
+    /// Its product with `x`.
+    fn times(&self, x: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let line = |i: usize| {
+            let at = self.begin[i]..self.begin[i + 1];
             let mut sum = [0.0; 3];
-            for (&i, f) in row.unknowns.iter().zip(row.factors) {
-                (0..3).for_each(|k| sum[k] += f * x[i as usize][k]);
+            for (&j, a) in self.columns[at.clone()].iter().zip(&self.entries[at]) {
+                (0..3).for_each(|k| sum[k] += a * x[j as usize][k]);
             }
-            for (&i, f) in row.unknowns.iter().zip(row.factors) {
-                (0..3).for_each(|k| y[i as usize][k] += row.weight * f * sum[k]);
-            }
-        }
-        y
+            sum
+        };
+        (0..x.len()).into_par_iter().with_min_len(CHUNK).map(line).collect()
+    }
+
+    /// `r` by the diagonal.
+    fn scaled(&self, r: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let by = |(r, &d): (&[f64; 3], &f64)| if d > 0.0 { r.map(|r| r / d) } else { [0.0; 3] };
+        r.par_iter().with_min_len(CHUNK).zip(&self.diagonal).map(by).collect()
+    }
+}
+
+/// Numbers that one thread sums at least.
+const CHUNK: usize = 4096;
+
+/// Scalar products of the three channels, by sums of whole chunks in their order: the same for any number of threads.
+fn dot(a: &[[f64; 3]], b: &[[f64; 3]]) -> [f64; 3] {
+    let add = |sum: [f64; 3], x: [f64; 3]| std::array::from_fn(|k| sum[k] + x[k]);
+    let of_chunk = |(a, b): (&[[f64; 3]], &[[f64; 3]])| {
+        a.iter().zip(b).fold([0.0; 3], |sum, (a, b)| add(sum, std::array::from_fn(|k| a[k] * b[k])))
     };
-    let dot = |a: &[[f64; 3]], b: &[[f64; 3]]| {
-        let mut sum = [0.0; 3];
-        for (a, b) in a.iter().zip(b) {
-            (0..3).for_each(|k| sum[k] += a[k] * b[k]);
-        }
-        sum
-    };
-    let scaled = |r: &[[f64; 3]]| -> Vec<[f64; 3]> {
-        r.iter().zip(diagonal).map(|(r, &d)| if d > 0.0 { r.map(|r| r / d) } else { [0.0; 3] }).collect()
-    };
+    let sums: Vec<[f64; 3]> = a.par_chunks(CHUNK).zip(b.par_chunks(CHUNK)).map(of_chunk).collect();
+    sums.into_iter().fold([0.0; 3], add)
+}
+
+/// Solves `matrix` · x = `right` for three channels at once, preconditioned by the diagonal.
+fn conjugate_gradients(matrix: &Matrix, right: &[[f64; 3]], mut x: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
     let ratio = |a: [f64; 3], b: [f64; 3]| -> [f64; 3] {
         std::array::from_fn(|k| if b[k] > 0.0 { a[k] / b[k] } else { 0.0 })
     };
-    let y = apply(&x);
-    let mut r: Vec<[f64; 3]> = right.iter().zip(&y).map(|(b, y)| [0, 1, 2].map(|k| b[k] - y[k])).collect();
-    let mut z = scaled(&r);
-    let mut p = z.clone();
-    let mut rz = dot(&r, &z);
-    let enough = dot(right, &scaled(right)).map(|b| b * TOLERANCE * TOLERANCE);
+    // a + s · b, into a.
+    let add = |a: &mut [[f64; 3]], s: [f64; 3], b: &[[f64; 3]]| {
+        let one = |(a, b): (&mut [f64; 3], &[f64; 3])| (0..3).for_each(|k| a[k] += s[k] * b[k]);
+        a.par_iter_mut().with_min_len(CHUNK).zip(b).for_each(one);
+    };
+    let mut r = right.to_vec();
+    add(&mut r, [-1.0; 3], &matrix.times(&x));
+    let mut p = matrix.scaled(&r);
+    let mut rz = dot(&r, &p);
+    let enough = dot(right, &matrix.scaled(right)).map(|b| b * TOLERANCE * TOLERANCE);
     for _ in 0..MOST_STEPS {
         if (0..3).all(|k| rz[k] <= enough[k]) {
             break;
         }
-        let q = apply(&p);
+        let q = matrix.times(&p);
         let alpha = ratio(rz, dot(&p, &q));
-        for i in 0..n {
-            for k in 0..3 {
-                x[i][k] += alpha[k] * p[i][k];
-                r[i][k] -= alpha[k] * q[i][k];
-            }
-        }
-        z = scaled(&r);
+        add(&mut x, alpha, &p);
+        add(&mut r, alpha.map(|a| -a), &q);
+        let mut z = matrix.scaled(&r);
         let next = dot(&r, &z);
-        let beta = ratio(next, rz);
-        for (p, z) in p.iter_mut().zip(&z) {
-            (0..3).for_each(|k| p[k] = z[k] + beta[k] * p[k]);
-        }
-        rz = next;
+        add(&mut z, ratio(next, rz), &p);
+        (p, rz) = (z, next);
     }
     x
 }

@@ -1,7 +1,8 @@
 //! The light at a point of a surface, whoever looks at it.
 
 use super::Light;
-use crate::integrator::hybrid::{Hybrid, Photons, Quality};
+use crate::direct::{Gloss, Plan, Spend, direct};
+use crate::integrator::hybrid::{Diffuse, Hybrid, Photons, Quality};
 use crate::render::DiffuseMode;
 use geometry::bsdf::{Bsdf, Shading};
 use geometry::math::offset_origin;
@@ -69,41 +70,63 @@ impl<'a> Lamp<'a> {
     /// With A and B the looks and m their mean, (x − m)² less the variance stated is (x − A)(x − B): what x is off, free
     /// of the noise that the looks do not share.
     pub fn seen(&self, place: Place, rng: &mut Rng) -> Seen {
-        let (a, b) = (self.look(place, rng), self.look(place, rng));
-        let half = 0.5 * (a.white - b.white).luminance();
-        Seen { white: (a.white + b.white) * 0.5, variance: half * half, ..a }
+        let spot = self.spot(place);
+        let (first, plan) = self.shine(&spot, rng);
+        // Only what is drawn by chance is looked at twice: vertices and photons say the same again.
+        let chance_alone = spot.known && !spot.translucent && first.gather_variance == 0.0;
+        let second = match chance_alone {
+            true => Diffuse { direct: self.straight(&spot, &plan, rng), ..first },
+            false => self.shine(&spot, rng).0,
+        };
+        let [a, b] = [first, second].map(|shown| spot.white(&shown));
+        let half = 0.5 * (a - b).luminance();
+        Seen { variance: half * half, ..self.told(spot, (a + b) * 0.5) }
     }
 
     /// The same by one look, whose noise is not known.
     pub fn look(&self, place: Place, rng: &mut Rng) -> Seen {
-        let world = self.by_vertices.world;
-        let surface = surface_at(world, place);
-        let (base, alpha) = base_color_at(&world.scene, &hit(place));
+        let spot = self.spot(place);
+        let white = spot.white(&self.shine(&spot, rng).0);
+        self.told(spot, white)
+    }
+
+    fn spot(&self, place: Place) -> Spot {
+        let scene = &self.by_vertices.world.scene;
+        let surface = surface_at(self.by_vertices.world, place);
+        let (base, alpha) = base_color_at(scene, &hit(place));
         let emission = surface.emission;
-        let wo = surface.ng;
         // The solution has values only where light is reflected diffusely.
-        let known = world.scene.materials[surface.material.0 as usize].may_be_diffuse();
-        let hybrid = if known { &self.by_vertices } else { &self.by_rays };
-        let quality = Quality { shadow: self.shadow, gather: true, photons: Photons::Always };
+        let known = scene.materials[surface.material.0 as usize].may_be_diffuse();
         let translucent = surface.bsdf.is_translucent();
-        let matt = match translucent {
+        let surface = match translucent {
             true => surface,
             false => {
                 let bsdf = Bsdf::new(&Shading::LAMBERT, surface.ns, surface.ng, surface.front);
                 Surface { bsdf, unlit: None, ..surface }
             }
         };
+        Spot { surface, base, alpha, emission, known, translucent }
+    }
+
+    fn shine(&self, spot: &Spot, rng: &mut Rng) -> (Diffuse, Plan) {
+        let hybrid = if spot.known { &self.by_vertices } else { &self.by_rays };
+        let quality = Quality { shadow: self.shadow, gather: true, photons: Photons::Always };
         let phase = rng.below(16);
-        let (shown, _) = hybrid.diffuse(&matt, wo, quality, phase, &[matt.position], rng);
-        let mut white = shown.direct + shown.indirect;
-        if translucent {
-            // What comes through from behind, as if it had come from the front.
-            let per = |l: f32, base: f32| l / base.max(0.02);
-            white = Rgb::new(per(white.r, base.r), per(white.g, base.g), per(white.b, base.b));
-        }
-        let hidden = self.is_hidden(&matt, white);
-        let seen = Seen { white, emission, base, alpha, hidden, variance: 0.0 };
-        if white.is_finite() { seen } else { Seen { white: Rgb::BLACK, ..seen } }
+        hybrid.diffuse(&spot.surface, spot.surface.ng, quality, phase, &[spot.surface.position], rng)
+    }
+
+    /// The light of the lamps alone, once more.
+    fn straight(&self, spot: &Spot, plan: &Plan, rng: &mut Rng) -> Rgb {
+        let (world, surface) = (self.by_vertices.world, &spot.surface);
+        let spend = Spend { samples: self.shadow, phase: rng.below(16), places: &[surface.position] };
+        direct(world, surface, surface.ng, plan, Gloss::None, spend, rng).diffuse
+    }
+
+    fn told(&self, spot: Spot, white: Rgb) -> Seen {
+        let white = if white.is_finite() { white } else { Rgb::BLACK };
+        let hidden = self.is_hidden(&spot.surface, white);
+        let Spot { base, alpha, emission, .. } = spot;
+        Seen { white, emission, base, alpha, hidden, variance: 0.0 }
     }
 
     /// Whether the ray straight up from `surface` ends close by, or in the dark on something's inside.
@@ -114,6 +137,30 @@ impl<'a> Lamp<'a> {
         let inside = world.scene.mesh.geometric_normal(hit.triangle).dot(ray.direction) > 0.0;
         let usual = reflected_radiance(Rgb::WHITE, self.by_vertices.solution.report.mean);
         hit.t < CLOSE * world.scale || (inside && white.luminance() < DARK * usual.luminance())
+    }
+}
+
+/// A place's surface, taken for white and matt where it is not translucent.
+struct Spot {
+    surface: Surface,
+    base: Rgb,
+    alpha: f32,
+    emission: Rgb,
+    /// Whether the solution has values there.
+    known: bool,
+    translucent: bool,
+}
+
+impl Spot {
+    /// What a white matt surface would send back, cd/m².
+    fn white(&self, shown: &Diffuse) -> Rgb {
+        let white = shown.direct + shown.indirect;
+        if !self.translucent {
+            return white;
+        }
+        // What comes through from behind, as if it had come from the front.
+        let per = |l: f32, base: f32| l / base.max(0.02);
+        Rgb::new(per(white.r, self.base.r), per(white.g, self.base.g), per(white.b, self.base.b))
     }
 }
 

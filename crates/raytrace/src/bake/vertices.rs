@@ -4,12 +4,14 @@
 //! the error asked is met or the vertices are used up. Samples stay where they are: after a split their elements are
 //! looked up anew, and only what has too few gets more.
 
+mod parts;
+
 use super::fit::{Facet, Observation, fit};
 use super::light::{Lamp, Place, Seen, roughly};
-use super::{Baked, Look, Part, Report, Settings};
+use super::{Baked, Look, Report, Settings};
 use crate::render::Progress;
 use geometry::sampling::{self, Rng};
-use geometry::{Rgb, Scene, Vec2, Vec3, World};
+use geometry::{Rgb, Scene, World};
 use radiosity::Solution;
 use radiosity::element::{EdgeMarks, Elements, Side, slot};
 use rayon::prelude::*;
@@ -67,6 +69,8 @@ struct Mesh<'a> {
     /// Whether light comes to the back of each face of the scene.
     lit_back: Vec<bool>,
     samples: Vec<Sample>,
+    /// Face of each sample, and its barycentrics there.
+    located: Vec<(u32, [f32; 3])>,
     faces: Vec<Face>,
     facets: Vec<Facet>,
     /// Face of each side of each leaf.
@@ -96,6 +100,7 @@ pub fn bake(
         elements: solution.elements().clone(),
         lit_back: Vec::new(),
         samples: Vec::new(),
+        located: Vec::new(),
         faces: Vec::new(),
         facets: Vec::new(),
         face_of: Vec::new(),
@@ -130,7 +135,7 @@ pub fn bake(
         }
     };
     report.flux_kept = flux_kept;
-    let parts = mesh.parts();
+    let parts = parts::parts(&mesh);
     Baked { looks: mesh.looks, parts, map: None, report }
 }
 
@@ -221,10 +226,9 @@ impl Mesh<'_> {
 
     /// Gives every face that has too few samples more.
     fn sample(&mut self, lamp: &Lamp, seed: u64, round: u32) {
+        let mut located: Vec<_> = self.samples.par_iter().map(|s| self.locate(s.place)).collect();
         let mut counts = vec![0u32; self.faces.len()];
-        for sample in &self.samples {
-            counts[self.locate(sample.place).0 as usize] += 1;
-        }
+        located.iter().for_each(|l| counts[l.0 as usize] += 1);
         let this = &*self;
         let more: Vec<Sample> = counts
             .par_iter()
@@ -248,19 +252,21 @@ impl Mesh<'_> {
                 })
             })
             .collect();
+        located.par_extend(more.par_iter().map(|s| self.locate(s.place)));
         self.samples.extend(more);
+        self.located = located;
     }
 
     /// Fits all values; returns the share of the samples' light that they hold.
     fn fit(&mut self) -> f32 {
-        let located: Vec<(u32, [f32; 3])> = self.samples.par_iter().map(|s| self.locate(s.place)).collect();
+        let located = &self.located;
         let mut counts = vec![0f32; self.faces.len()];
         located.iter().for_each(|l| counts[l.0 as usize] += 1.0);
         let observe = |(s, &(facet, at)): (&Sample, &(u32, [f32; 3]))| {
             let weight = self.facets[facet as usize].area() / counts[facet as usize];
             Observation { facet, at, value: s.value, weight: if s.hidden { HIDDEN * weight } else { weight } }
         };
-        let observations: Vec<Observation> = self.samples.iter().zip(&located).map(observe).collect();
+        let observations: Vec<Observation> = self.samples.iter().zip(located).map(observe).collect();
         // Least squares overshoot beside an edge, below zero where there is no light.
         self.values =
             fit(self.unknowns, &self.facets, &observations).into_iter().map(|v| v.max(Rgb::BLACK)).collect();
@@ -284,14 +290,13 @@ impl Mesh<'_> {
     }
 
     /// Square of the difference from `s` at its place relative to the light there, less what is the sample's own noise.
-    fn square(&self, s: &Sample) -> (u32, f64) {
-        let (face, at) = self.locate(s.place);
+    fn square(&self, s: &Sample, (face, at): (u32, [f32; 3])) -> f64 {
         if s.hidden {
-            return (face, 0.0);
+            return 0.0;
         }
         let (held, seen) = (self.fitted(face, at).luminance(), s.value.luminance());
         let square = f64::from(held - seen).powi(2) - f64::from(s.variance);
-        (face, square / relative_to(f64::from(held.max(seen)), self.brightness))
+        square / relative_to(f64::from(held.max(seen)), self.brightness)
     }
 
     /// The error at fresh places, spread evenly over the area; lamps do not count.
@@ -319,7 +324,7 @@ impl Mesh<'_> {
                 if seen.hidden {
                     return (0.0, 0.0);
                 }
-                (self.square(&sample).1, 1.0)
+                (self.square(&sample, self.locate(place)), 1.0)
             })
             .collect();
         let (off, count) = judged.iter().fold((0.0, 0.0), |(a, b), &(x, y)| (a + x, b + y));
@@ -333,8 +338,9 @@ impl Mesh<'_> {
         };
         let mut off = vec![(0.0, 0.0); self.faces.len()];
         let mut area_of_all = 0.0;
-        let squares: Vec<(u32, f64)> = self.samples.par_iter().map(|s| self.square(s)).collect();
-        for (face, square) in squares {
+        let squares: Vec<f64> =
+            self.samples.par_iter().zip(&self.located).map(|(s, &at)| self.square(s, at)).collect();
+        for (&(face, _), square) in self.located.iter().zip(squares) {
             let sum: &mut (f64, f64) = &mut off[face as usize];
             *sum = (sum.0 + square, sum.1 + 1.0);
         }
@@ -377,35 +383,6 @@ impl Mesh<'_> {
         let [a, b, c] = self.elements.corners(leaf);
         a.distance(b).max(b.distance(c)).max(c.distance(a))
     }
-
-    /// The mesh as it is written: elements where light is kept, the scene's triangles elsewhere.
-    fn parts(&self) -> Vec<Part> {
-        let scene = self.scene();
-        let mut of_triangle = vec![Vec::new(); scene.mesh.triangles.len()];
-        for (f, face) in self.faces.iter().enumerate() {
-            of_triangle[face.triangle as usize].push(f as u32);
-        }
-        let mut parts = Vec::new();
-        for range in &scene.mesh.parts {
-            let mut triangles: Vec<u32> = (range.first..range.first + range.count).collect();
-            triangles.sort_by_key(|&t| scene.mesh.materials[t as usize]);
-            for run in triangles
-                .chunk_by(|&a, &b| scene.mesh.materials[a as usize] == scene.mesh.materials[b as usize])
-            {
-                let mut build = Builder::new(scene, &range.name, scene.mesh.materials[run[0] as usize].0);
-                for &t in run {
-                    if !self.look(t).takes_light() {
-                        build.triangle(t, Side::Front);
-                    }
-                    for &f in &of_triangle[t as usize] {
-                        build.face(self, f);
-                    }
-                }
-                parts.extend(build.finish());
-            }
-        }
-        parts
-    }
 }
 
 /// What a squared difference is relative to, where the brighter of both is `l` and the mean light `mean`: a tenth of the
@@ -438,86 +415,5 @@ impl Face {
         let [a, b, c] = self.uv;
         let uv = [0, 1].map(|k| a[k] + (b[k] - a[k]) * u + (c[k] - a[k]) * v);
         Place { triangle: self.triangle, uv, side: self.side }
-    }
-}
-
-/// A part in the making.
-struct Builder<'a> {
-    scene: &'a Scene,
-    part: Part,
-    known: HashMap<(u64, [u32; 8]), u32>,
-}
-
-impl<'a> Builder<'a> {
-    fn new(scene: &'a Scene, name: &str, material: u32) -> Builder<'a> {
-        let part = Part { name: name.into(), material, ..Part::default() };
-        Builder { scene, part, known: HashMap::new() }
-    }
-
-    /// A triangle of the scene as it is.
-    fn triangle(&mut self, t: u32, side: Side) {
-        let mesh = &self.scene.mesh;
-        let corners = mesh.triangles[t as usize];
-        let uv = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
-        let at = [0, 1, 2].map(|k| {
-            self.vertex(t, uv[k], mesh.positions[corners[k] as usize], side, u64::from(corners[k]), None)
-        });
-        self.push(at, side);
-    }
-
-    /// One side of an element.
-    fn face(&mut self, mesh: &Mesh, f: u32) {
-        let (face, facet) = (&mesh.faces[f as usize], &mesh.facets[f as usize]);
-        let at = [0, 1, 2].map(|k| {
-            let unknown = facet.unknowns[k];
-            let light = Some(mesh.values[unknown as usize]);
-            self.vertex(face.triangle, face.uv[k], facet.corners[k], face.side, u64::from(unknown), light)
-        });
-        self.push(at, face.side);
-    }
-
-    fn push(&mut self, [a, b, c]: [u32; 3], side: Side) {
-        self.part.triangles.push(if side == Side::Front { [a, b, c] } else { [a, c, b] });
-    }
-
-    /// The vertex with these attributes: an old one if there is one.
-    fn vertex(&mut self, t: u32, uv: [f32; 2], p: Vec3, side: Side, id: u64, light: Option<Rgb>) -> u32 {
-        let mesh = &self.scene.mesh;
-        let [u, v] = uv;
-        let uvs: [Option<Vec2>; 2] = [0, 1]
-            .map(|set: usize| (!mesh.uvs[set].is_empty()).then(|| mesh.interpolate(t, u, v, &mesh.uvs[set])));
-        let color = (!mesh.colors.is_empty()).then(|| mesh.interpolate(t, u, v, &mesh.colors).to_array());
-        let smooth =
-            if mesh.normals.is_empty() { Vec3::ZERO } else { mesh.interpolate(t, u, v, &mesh.normals) };
-        let normal = smooth.try_normalize().unwrap_or_else(|| mesh.geometric_normal(t)) * side.sign();
-        // Two triangles interpolate to the same on their common edge but for rounding.
-        let rough = |x: f32| (x * 65536.0).round() as i32 as u32;
-        let c = color.unwrap_or_default();
-        let [a, b] = uvs.map(|uv| uv.unwrap_or_default());
-        let key = [
-            rough(a.x),
-            rough(a.y),
-            rough(b.x),
-            rough(b.y),
-            rough(c[0]),
-            rough(c[1]),
-            rough(c[2]),
-            rough(c[3]),
-        ];
-        *self.known.entry((id, key)).or_insert_with(|| {
-            let part = &mut self.part;
-            part.positions.push(p);
-            part.normals.push(normal);
-            for (set, uv) in part.uvs.iter_mut().zip(uvs) {
-                set.extend(uv);
-            }
-            part.colors.extend(color);
-            part.light.extend(light);
-            part.positions.len() as u32 - 1
-        })
-    }
-
-    fn finish(self) -> Option<Part> {
-        (!self.part.triangles.is_empty()).then_some(self.part)
     }
 }
