@@ -33,6 +33,7 @@ pub mod camera;
 pub mod dispersion;
 pub mod emitter;
 pub mod fingerprint;
+pub mod flights;
 pub mod gltf;
 pub mod ies;
 pub mod light_groups;

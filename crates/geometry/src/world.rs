@@ -1,10 +1,10 @@
 //! A scene made ready for rays: its search tree and its lights.
 
 use crate::emitter::Emitters;
-use crate::math::{Vec3, offset_origin, to_world};
+use crate::flights::room_size;
+use crate::math::Vec3;
 use crate::nesting::Nesting;
 use crate::optics::attenuation;
-use crate::sampling::{self, Rng};
 use crate::surface::straight_through;
 use crate::{Bvh, Hit, Mesh, Ray, Rgb, Scene, Surface, Volume};
 
@@ -22,8 +22,8 @@ pub struct World {
     pub emitters: Emitters,
     /// Diagonal of the bounding box, m.
     pub diagonal: f32,
-    /// Size of the rooms in it, m: five times the median flight of a diffuse ray. What depends on the size of things is measured by it, not by the
-    /// diagonal, which a ground plane or a far landscape inflates.
+    /// Size of the rooms in it, m, by the flights of diffuse rays ([`crate::flights`]). What depends on the size of things
+    /// is measured by it, not by the diagonal, which a ground plane or a far landscape inflates.
     pub scale: f32,
     /// Lowest and highest corner of the bounding box, m; zero without vertices.
     pub bounds: (Vec3, Vec3),
@@ -114,41 +114,6 @@ fn see_through(scene: &Scene) -> Option<Mesh> {
 /// Share of light left after `way` m of a medium.
 fn over(medium: Option<Volume>, way: f32) -> Rgb {
     medium.map_or(Rgb::WHITE, |m| attenuation(m.attenuation_color, m.attenuation_distance, way))
-}
-
-/// Typical size of an enclosed space, m: five times the median distance that a diffuse ray flies, at most `diagonal`.
-///
-/// Furniture halves the distance of the empty room, whose diagonal is two to three times it. The rays start on triangles drawn by the square root of their area, a
-/// compromise between the ground outside, which has all the area, and the furniture, which has all the triangles.
-fn room_size(mesh: &Mesh, bvh: &Bvh, diagonal: f32) -> f32 {
-    const RAYS: usize = 4096;
-    let mut sums: Vec<f64> = Vec::with_capacity(mesh.triangles.len());
-    let mut sum = 0.0;
-    for t in 0..mesh.triangles.len() as u32 {
-        sum += f64::from(mesh.area(t)).sqrt();
-        sums.push(sum);
-    }
-    if sum <= 0.0 {
-        return diagonal;
-    }
-    let mut rng = Rng::new(0x73_6361_6c65, 0);
-    let mut distances: Vec<f32> = (0..RAYS)
-        .filter_map(|i| {
-            let at = f64::from(rng.f32()) * sum;
-            let t = sums.partition_point(|&s| s <= at).min(sums.len() - 1) as u32;
-            let (u, v) = sampling::triangle(rng.vec2());
-            let n = mesh.geometric_normal(t) * if i % 2 == 0 { 1.0 } else { -1.0 };
-            let wi = to_world(sampling::cosine_hemisphere(rng.vec2()), n);
-            let origin = offset_origin(mesh.interpolate(t, u, v, &mesh.positions), n);
-            bvh.closest_hit(&Ray::new(origin, wi)).map(|hit| hit.t)
-        })
-        .collect();
-    if distances.len() < RAYS / 64 {
-        return diagonal; // an open scene: hardly anything sees anything else
-    }
-    let middle = distances.len() / 2;
-    let median = *distances.select_nth_unstable_by(middle, f32::total_cmp).1;
-    (5.0 * median).min(diagonal)
 }
 
 #[cfg(test)]

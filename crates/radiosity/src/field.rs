@@ -97,7 +97,7 @@ pub struct Field {
 }
 
 /// A site most of whose rays first meet a dead side is buried in an object.
-const BURIED: f32 = 0.5;
+pub(crate) const BURIED: f32 = 0.5;
 
 impl Field {
     /// Whether the slot has a value that its surroundings may be interpolated from.

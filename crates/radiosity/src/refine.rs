@@ -7,13 +7,14 @@ use crate::clusters::{Clusters, Member};
 use crate::element::cluster;
 use crate::element::{EdgeMarks, Elements, Side, VertexId, slot};
 use crate::field::Field;
+use crate::first_mesh::first_mesh;
 use crate::flags::{Flags, visible_weights};
 use crate::importance::Importance;
 use crate::influence;
 use crate::journal::Journal;
 use crate::reach::Reach;
 use crate::solve::{Config, Progress};
-use crate::solver::{self, Convergence};
+use crate::solver::{self, Convergence, Stakes};
 use crate::transport::{Landing, Transport};
 use geometry::math::offset_origin;
 use geometry::sampling::Lattice2;
@@ -28,8 +29,6 @@ const ROUGH: f32 = 0.15;
 /// Times the variance of the noise that such a difference is to exceed: two standard deviations. With one, the gallery's
 /// pixels gathered for themselves wherever 80 rays a site happened to differ.
 const STANDS_OUT: f32 = 4.0;
-/// Elements (of h0² each) that the first mesh may have, about.
-const FIRST_ELEMENTS: f32 = 10_000.0;
 /// A round for fewer new sites than one in so many is not worth its while.
 const HARDLY: usize = 20;
 /// Rays that probe the middle of a leaf.
@@ -108,13 +107,9 @@ impl<'a> Refiner<'a> {
         progress: &'a dyn Progress,
     ) -> Refiner<'a> {
         let scale = world.scale;
-        let (h0, h_min, mut radius) =
-            (config.h0 * scale, config.h_min * scale, config.cluster_radius * scale);
-        let mut elements = Elements::new(&world.scene.mesh);
-        let most = config.most_vertices.max(2 * elements.vertices.len());
-        // A landscape outside may not eat up the first mesh: its elements stay coarse.
-        let area: f32 = (0..world.scene.mesh.triangles.len() as u32).map(|t| world.scene.mesh.area(t)).sum();
-        elements.split_longer_than(h0.max((area / FIRST_ELEMENTS).sqrt()), most);
+        let (h_min, mut radius) = (config.h_min * scale, config.cluster_radius * scale);
+        let most = config.most_vertices.max(2 * world.scene.mesh.positions.len());
+        let (elements, h0) = first_mesh(world, config.h0 * scale, most);
         let reach = Reach::explore(world, &elements, config.seed);
         let mut diffuse = vec![false; elements.pieces as usize];
         for (t, material) in world.scene.mesh.materials.iter().enumerate() {
@@ -482,7 +477,8 @@ impl<'a> Refiner<'a> {
         let norm = transport.norm();
         let reflect = |e: &[Rgb]| transport.reflect(e, &[]);
         let apply = |e: &[Rgb]| transport.apply(e, extra);
-        let (e, convergence) = solver::solve(self.e.clone(), tolerance, most, apply, reflect);
+        let stakes = self.stakes();
+        let (e, convergence) = solver::solve(self.e.clone(), &stakes, tolerance, most, apply, reflect);
         let variance = transport.variance(&e);
         // Each group of lights by itself, on the same rows: E is their sum.
         let settled = !flags.is_empty();
@@ -497,10 +493,21 @@ impl<'a> Refiner<'a> {
                     sum.iter_mut().zip(&direct).for_each(|(sum, &d)| *sum += d);
                     sum
                 };
-                solver::solve(direct.clone(), bound, most, apply, reflect).0
+                solver::solve(direct.clone(), &stakes, bound, most, apply, reflect).0
             })
             .collect();
         Solved { e, parts, variance, convergence, norm }
+    }
+
+    /// What an error at each site matters.
+    fn stakes(&self) -> Stakes {
+        let around =
+            self.levels(self.field.sites.iter().zip(&self.e).map(|(s, e)| (s.vertex, s.side, e.mean())));
+        let slots = || self.field.sites.iter().map(|s| slot(s.vertex, s.side));
+        Stakes {
+            weights: slots().map(|s| self.weight(s)).collect(),
+            levels: slots().map(|s| around[self.face_slot(s)]).collect(),
+        }
     }
 
     /// The rows over the present mesh.

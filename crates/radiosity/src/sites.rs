@@ -1,8 +1,9 @@
 //! Gathering at the vertices of the element mesh: where the rays start, and how many they are.
 
 use crate::element::{Side, VertexId, slot};
-use crate::field::Site;
+use crate::field::{BURIED, Site};
 use crate::gather::{self, Origin};
+use crate::noise::{Witness, hearsay};
 use crate::refine::{INWARD, Refiner};
 use crate::solve::lock;
 use crate::transport::Row;
@@ -15,6 +16,8 @@ use std::collections::HashMap;
 const FACETS: usize = 16;
 /// Light samples that tell how bright a site is besides what it gathers.
 const GLANCES: u32 = 16;
+/// Times the rays of all that a site may get where there is noise.
+const MOST_RAYS: u32 = 16;
 /// Rows in one record of a journal: what is lost when a solve is cut off.
 const RECORD: usize = 256;
 
@@ -31,27 +34,16 @@ impl Refiner<'_> {
             .filter(|(v, _)| origins.contains_key(v))
             .collect();
         let lit = self.glance(&jobs, &origins);
-        let mut rays = self.config.rays;
-        let mut rows = self.gather_rows(&jobs, &origins, |s| self.rays_for(s));
-        // Where few rays find the light (a sunny patch, a lamp behind a shade) it takes more of them.
+        let mut rows = self.gather_rows(&jobs, &origins, |i| self.rays_for(slot(jobs[i].0, jobs[i].1)));
         for _ in 0..2 {
-            rays *= 4;
-            let before = self.field.sites.iter().map(|s| (s.vertex, s.side, s.row.direct.mean()));
-            let new = jobs.iter().zip(&rows).map(|(&(v, side), row)| (v, side, row.direct.mean()));
-            let around = self.levels(before.chain(new));
-            let noisy = |i: &usize| {
-                let (row, (v, side)) = (&rows[*i], jobs[*i]);
-                let s = slot(v, side);
-                self.weight(s) * row.variance.sqrt()
-                    > self.config.noise
-                        * (row.direct.mean() + lit[*i].mean() + 0.1 * around[self.face_slot(s)])
-            };
-            let which: Vec<usize> = (0..rows.len()).filter(noisy).collect();
+            let wanted = self.rays_wanted(&jobs, &rows, &lit);
+            let which: Vec<usize> = (0..rows.len()).filter(|&i| wanted[i] > rows[i].rays).collect();
             if which.is_empty() || self.progress.stopped() {
                 break;
             }
             let again: Vec<(VertexId, Side)> = which.iter().map(|&i| jobs[i]).collect();
-            for (i, row) in which.into_iter().zip(self.gather_rows(&again, &origins, |_| rays)) {
+            let new = self.gather_rows(&again, &origins, |i| wanted[which[i]]);
+            for (i, row) in which.into_iter().zip(new) {
                 rows[i] = row;
             }
         }
@@ -81,6 +73,47 @@ impl Refiner<'_> {
         jobs.par_iter().map(at).collect()
     }
 
+    /// Rays that each of `jobs` should have by what is known after `rows`: as many as it has, or up to [`MOST_RAYS`] times as
+    /// many as all get where the neighbours' are noisy.
+    fn rays_wanted(&self, jobs: &[(VertexId, Side)], rows: &[Row], lit: &[Rgb]) -> Vec<u32> {
+        let new = || jobs.iter().zip(rows).map(|(&(v, side), row)| (v, side, row));
+        let before = || self.field.sites.iter().map(|s| (s.vertex, s.side, &s.row));
+        let around = self.levels(before().chain(new()).map(|(v, side, row)| (v, side, row.direct.mean())));
+        // What is buried sees no light, and tells nothing of it.
+        let mut number = vec![usize::MAX; jobs.len()];
+        let mut witnesses = Vec::new();
+        for (i, (v, side, row)) in new().chain(before()).enumerate() {
+            if row.dead > BURIED {
+                continue;
+            }
+            if let Some(number) = number.get_mut(i) {
+                *number = witnesses.len();
+            }
+            let vertex = &self.elements.vertices[v as usize];
+            witnesses.push(Witness {
+                position: vertex.position,
+                normal: vertex.normal * side.sign(),
+                direct: row.direct,
+                variance: row.variance,
+                rays: row.rays,
+            });
+        }
+        let heard = hearsay(&witnesses, self.world.scale);
+        let wanted = |i: usize| {
+            let (mut rays, (v, side)) = (rows[i].rays, jobs[i]);
+            let Some(heard) = heard.get(number[i]) else { return rays };
+            let s = slot(v, side);
+            let allowed =
+                self.config.noise * (heard.direct + lit[i].mean() + 0.1 * around[self.face_slot(s)]);
+            let noisy = |rays| self.weight(s) * heard.variance(rays).sqrt() > allowed;
+            while rays < MOST_RAYS * self.config.rays && noisy(rays) {
+                rays *= 2;
+            }
+            rays
+        };
+        (0..jobs.len()).map(wanted).collect()
+    }
+
     /// Rays that a slot gets at first. What nobody sees is averaged over many sites before it shows.
     fn rays_for(&self, slot: usize) -> u32 {
         const LEAST: u32 = 32;
@@ -88,7 +121,7 @@ impl Refiner<'_> {
         ((all as f32 * self.weight(slot).min(1.0)) as u32).next_multiple_of(16).max(LEAST.min(all))
     }
 
-    /// Rows of as many rays as `rays` says for a slot, fewer where landings would take more memory than they may.
+    /// Rows of as many rays as `rays` says for the job of each number, fewer where landings would take more memory than they may.
     fn gather_rows(
         &self,
         jobs: &[(VertexId, Side)],
@@ -98,7 +131,7 @@ impl Refiner<'_> {
         let held: usize = self.field.sites.iter().map(|s| s.row.landings.len()).sum();
         let room = self.config.most_landings.saturating_sub(held) / jobs.len().max(1);
         let room = u32::try_from(room).unwrap_or(u32::MAX);
-        let rays: Vec<u32> = jobs.iter().map(|&(v, side)| rays(slot(v, side)).min(room).max(16)).collect();
+        let rays: Vec<u32> = (0..jobs.len()).map(|i| rays(i).min(room).max(16)).collect();
         let mut patterns: HashMap<u32, Lattice2> = HashMap::new();
         for &n in &rays {
             patterns.entry(n).or_insert_with(|| Lattice2::new(n));

@@ -16,11 +16,11 @@ use thiserror::Error;
 pub struct Config {
     /// Rays gathered at each site. Error of E measured in a Cornell box: 64 → 5.7 %, 256 → 1.9 %, 1024 → 0.67 %.
     pub rays: u32,
-    /// Relative noise of a site's own value above which it gets four times as many rays, twice at most.
+    /// Relative noise of a site's value, by its neighbours', above which it gets more rays, up to 16 times as many.
     pub noise: f32,
     /// Relative midpoint error × (edge / h0) above which an edge is refined further.
     pub tolerance: f32,
-    /// Longest edge of the first mesh.
+    /// Longest edge of the first mesh; where that made too many elements it is longer.
     pub h0: f32,
     /// Shortest edge that refinement makes.
     pub h_min: f32,

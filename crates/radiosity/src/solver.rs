@@ -11,8 +11,17 @@ const HISTORY: usize = 5;
 
 /// Terms of the series in [`outstanding`] that are summed before the rest is taken as geometric.
 const TERMS: usize = 6;
-/// What is this much darker than the mean is as dark as this, when errors there are weighed.
+/// What is this much darker than its surroundings is as dark as this, when errors there are weighed.
 const DIM: f32 = 0.1;
+
+/// What an error at each value matters.
+#[derive(Clone, Debug, Default)]
+pub struct Stakes {
+    /// Weight of each; empty where all matter alike.
+    pub weights: Vec<f32>,
+    /// How bright it is around each, lx: what an error there is seen beside. Empty where that is the mean of all.
+    pub levels: Vec<f32>,
+}
 
 /// How a solve ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -28,7 +37,8 @@ pub struct Convergence {
     pub converged: bool,
 }
 
-/// Iterates E ← D + K E from `start` until values are on average no further than `tolerance` (lx) from the fixed point.
+/// Iterates E ← D + K E from `start` until values are on average no further than `tolerance` (lx) from the fixed point,
+/// weighed by `stakes`.
 ///
 /// - `apply`: E to D + K E.
 /// - `reflect`: E to K E, for the bound.
@@ -37,6 +47,7 @@ pub struct Convergence {
 /// 49(4), 2011, alg. 2.2), least squares by normal equations in f64.
 pub fn solve(
     start: Vec<Rgb>,
+    stakes: &Stakes,
     tolerance: f32,
     most: u32,
     apply: impl Fn(&[Rgb]) -> Vec<Rgb>,
@@ -44,7 +55,7 @@ pub fn solve(
 ) -> (Vec<Rgb>, Convergence) {
     let mut x = start;
     let mut report = Convergence::default();
-    let mut bound = Bound::default();
+    let mut bound = Bound::new(stakes);
     let (mut dg, mut df): (Vec<Vec<Rgb>>, Vec<Vec<Rgb>>) = (Vec::new(), Vec::new());
     let mut previous: Option<(Vec<Rgb>, Vec<Rgb>)> = None; // g(x) and f = g(x) − x of the last step
     loop {
@@ -81,23 +92,22 @@ pub fn solve(
 }
 
 /// [`outstanding`], worked out only where the last one gives reason to hope that it is small enough.
-struct Bound {
+struct Bound<'a> {
+    stakes: &'a Stakes,
     /// What a residual brings in all, by the last that was worked out: itself at least.
     gain: f32,
 }
 
-impl Default for Bound {
-    fn default() -> Bound {
-        Bound { gain: 1.0 }
+impl<'a> Bound<'a> {
+    fn new(stakes: &'a Stakes) -> Bound<'a> {
+        Bound { stakes, gain: 1.0 }
     }
-}
 
-impl Bound {
     /// The bound of values `x` with the residual `f`; a guess where that is more than `wanted` (lx).
     fn of(&mut self, f: &[Rgb], x: &[Rgb], wanted: f32, reflect: impl Fn(&[Rgb]) -> Vec<Rgb>) -> f32 {
-        let left = weighed(f, x);
+        let left = self.stakes.weighed(f, x);
         if left * self.gain <= wanted && left > 0.0 {
-            let bound = outstanding(f, x, reflect);
+            let bound = outstanding(f, x, self.stakes, reflect);
             // After one that is infinite there may be others that are not.
             self.gain = (bound / left).min(1000.0);
             return bound;
@@ -107,22 +117,22 @@ impl Bound {
 }
 
 /// How far values `x` with the residual `f` = D + K x − x are on average from the fixed point, lx, at most: the light that the
-/// residual would bring yet at every bounce, Σ |K|ᵏ |f|, whatever its sign; what is dim counts as if it were as bright as
-/// the mean, up to ten times. Infinite where light does not fade.
+/// residual would bring yet at every bounce, Σ |K|ᵏ |f|, whatever its sign, by [`Stakes::weighed`]. Infinite where light
+/// does not fade.
 ///
 /// The first terms are summed, the rest is a geometric series of the last two's ratio. The largest residual times
 /// ‖(I − K)⁻¹‖∞ would bound every value, but a few folds between white surfaces set it: in a furnished room of 400 000
 /// triangles it asked for 74 iterations and 39 more for the norm, where the mean of the values stood still after 15.
-fn outstanding(f: &[Rgb], x: &[Rgb], reflect: impl Fn(&[Rgb]) -> Vec<Rgb>) -> f32 {
+fn outstanding(f: &[Rgb], x: &[Rgb], stakes: &Stakes, reflect: impl Fn(&[Rgb]) -> Vec<Rgb>) -> f32 {
     let mut left: Vec<Rgb> = f.par_iter().map(|f| f.map(f32::abs)).collect();
-    let mut term = weighed(&left, x);
+    let mut term = stakes.weighed(&left, x);
     let mut sum = term;
     for k in 1..=TERMS {
         if term == 0.0 {
             break;
         }
         left = reflect(&left);
-        let ratio = weighed(&left, x) / term;
+        let ratio = stakes.weighed(&left, x) / term;
         term *= ratio;
         sum += term;
         let rest = if ratio < 1.0 { term * ratio / (1.0 - ratio) } else { f32::INFINITY };
@@ -133,14 +143,23 @@ fn outstanding(f: &[Rgb], x: &[Rgb], reflect: impl Fn(&[Rgb]) -> Vec<Rgb>) -> f3
     sum
 }
 
-/// Mean of `errors` (the largest channel of each) at values `x`, with more weight where these are dim.
-fn weighed(errors: &[Rgb], x: &[Rgb]) -> f32 {
-    // In order and in f64: the same bits whatever the number of threads.
-    let level = x.iter().map(|x| f64::from(x.mean())).sum::<f64>() / x.len().max(1) as f64;
-    let weight = |x: &Rgb| (level / f64::from(x.mean()).max(f64::from(DIM) * level).max(1e-300)).max(1.0);
-    let sum: f64 =
-        errors.iter().zip(x).map(|(e, x)| f64::from(e.map(f32::abs).max_channel()) * weight(x)).sum();
-    (sum / x.len().max(1) as f64) as f32
+impl Stakes {
+    /// Mean of `errors` (the largest channel of each) at values `x`: by weight, and more of it where it is dim, for a dim
+    /// room beside a bright one is looked at by eyes that are used to it. There an error counts as if the value were as
+    /// bright as the mean, up to ten times what it would at the brightness around.
+    fn weighed(&self, errors: &[Rgb], x: &[Rgb]) -> f32 {
+        // In order and in f64: the same bits whatever the number of threads.
+        let mean = x.iter().map(|x| f64::from(x.mean())).sum::<f64>() / x.len().max(1) as f64;
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for (i, (error, x)) in errors.iter().zip(x).enumerate() {
+            let level = self.levels.get(i).map_or(mean, |&l| f64::from(l));
+            let weight = self.weights.get(i).map_or(1.0, |&w| f64::from(w));
+            let dim = (mean / f64::from(x.mean()).max(f64::from(DIM) * level).max(1e-300)).max(1.0);
+            sum += weight * dim * f64::from(error.map(f32::abs).max_channel());
+            weights += weight;
+        }
+        if weights > 0.0 { (sum / weights) as f32 } else { 0.0 }
+    }
 }
 
 fn difference(a: &[Rgb], b: &[Rgb]) -> Vec<Rgb> {
@@ -218,8 +237,11 @@ mod tests {
     #[test]
     fn the_bound_holds_at_every_reflectance() {
         for rho in [0.2, 0.5, 0.8, 0.95, 0.99] {
-            let exact = solve(vec![Rgb::BLACK; 50], 1e-7, 20_000, ring(rho, 1.0), ring(rho, 0.0)).0;
-            let (e, report) = solve(vec![Rgb::BLACK; 50], 1e-3, 2000, ring(rho, 1.0), ring(rho, 0.0));
+            let exact =
+                solve(vec![Rgb::BLACK; 50], &Stakes::default(), 1e-7, 20_000, ring(rho, 1.0), ring(rho, 0.0))
+                    .0;
+            let (e, report) =
+                solve(vec![Rgb::BLACK; 50], &Stakes::default(), 1e-3, 2000, ring(rho, 1.0), ring(rho, 0.0));
             assert!(report.converged, "{rho}: {report:?}");
             let error = mean_error(&e, &exact);
             // The exact one is within 1e-4 here: f32 sums of 100 with 1e-7 relative rounding.
@@ -232,7 +254,7 @@ mod tests {
     fn what_a_residual_brings_is_the_sum_of_its_bounces() {
         for rho in [0.0, 0.3, 0.9, 0.99f32] {
             let (f, x) = (vec![Rgb::splat(-0.01); 50], vec![Rgb::WHITE; 50]);
-            let got = outstanding(&f, &x, ring(rho, 0.0));
+            let got = outstanding(&f, &x, &Stakes::default(), ring(rho, 0.0));
             assert!((got * (1.0 - rho) / 0.01 - 1.0).abs() < 0.01, "{rho}: {got}");
         }
     }
@@ -247,9 +269,10 @@ mod tests {
                 next
             }
         };
-        let exact = solve(vec![Rgb::BLACK; 100], 1e-6, 5000, room(1.0), room(0.0)).0;
+        let exact = solve(vec![Rgb::BLACK; 100], &Stakes::default(), 1e-6, 5000, room(1.0), room(0.0)).0;
         let tolerance = 0.01 * exact.iter().map(|e| e.mean()).sum::<f32>() / 100.0;
-        let (e, report) = solve(vec![Rgb::BLACK; 100], tolerance, 500, room(1.0), room(0.0));
+        let (e, report) =
+            solve(vec![Rgb::BLACK; 100], &Stakes::default(), tolerance, 500, room(1.0), room(0.0));
         let error = mean_error(&e, &exact);
         assert!(report.converged && report.iterations < 40, "{report:?}");
         assert!(error <= report.bound && report.bound <= tolerance, "{error}, {report:?}");
@@ -270,14 +293,15 @@ mod tests {
                 (0..n).map(row).collect()
             }
         };
-        let (_, report) = solve(vec![Rgb::BLACK; n], 1e-2, 1000, room(1.0), room(0.0));
+        let (_, report) = solve(vec![Rgb::BLACK; n], &Stakes::default(), 1e-2, 1000, room(1.0), room(0.0));
         // Plain iteration gains a factor of 0.99 a step: ln(1e-4) / ln(0.99) ≈ 900 of them.
         assert!(report.converged && report.iterations < 40, "{report:?}");
     }
 
     #[test]
     fn a_room_that_absorbs_nothing_never_claims_a_bound() {
-        let (_, report) = solve(vec![Rgb::BLACK; 50], 1e-3, 300, ring(1.0, 1.0), ring(1.0, 0.0));
+        let (_, report) =
+            solve(vec![Rgb::BLACK; 50], &Stakes::default(), 1e-3, 300, ring(1.0, 1.0), ring(1.0, 0.0));
         assert!(!report.converged && report.bound > 10.0, "{report:?}");
     }
 }

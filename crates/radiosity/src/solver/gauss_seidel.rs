@@ -1,6 +1,6 @@
 //! B = M + ρ F B by Gauss and Seidel's iteration, as the first radiosity renderers solved it (Goral et al., 1984).
 
-use super::{Bound, Convergence};
+use super::{Bound, Convergence, Stakes};
 use crate::form_factor::matrix::Matrix;
 use geometry::Rgb;
 use rayon::prelude::*;
@@ -21,7 +21,8 @@ pub fn solve(
     let reflect = |x: &[Rgb]| -> Vec<Rgb> {
         matrix.apply(x).into_iter().zip(reflectance).map(|(h, &rho)| rho * h).collect()
     };
-    let (mut report, mut bound) = (Convergence::default(), Bound::default());
+    let alike = Stakes::default();
+    let (mut report, mut bound) = (Convergence::default(), Bound::new(&alike));
     let mut x: Vec<Vec<f64>> = (0..3).map(|c| source.iter().map(|s| f64::from(s[c])).collect()).collect();
     loop {
         let values = rounded(&x);

@@ -355,7 +355,7 @@ impl Mesh<'_> {
             area_of_all += area;
             let energy = area * (square / count).max(0.0);
             all += energy;
-            if self.longest_edge(face.leaf) > 2.0 * SHORTEST * self.world.scale && energy > 0.0 {
+            if self.elements.longest_edge(face.leaf) > 2.0 * SHORTEST * self.world.scale && energy > 0.0 {
                 worst.push((energy, face.leaf));
             }
         }
@@ -377,11 +377,6 @@ impl Mesh<'_> {
         }
         self.elements.split(&mut marks);
         Refined::Some
-    }
-
-    fn longest_edge(&self, leaf: u32) -> f32 {
-        let [a, b, c] = self.elements.corners(leaf);
-        a.distance(b).max(b.distance(c)).max(c.distance(a))
     }
 }
 
