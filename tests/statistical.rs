@@ -3,15 +3,17 @@
 //! Samples are independent and seeds fixed; z by the measured variance, |z| < 4.9, so one false alarm in a million each.
 
 use geometry::sampling::Rng;
-use geometry::{Vec3, World};
+use geometry::{Rgb, Vec3, World};
+use radiosity::Config;
 use radiosity::caustic::Caustics;
-use radiosity::element::Elements;
+use radiosity::element::{Elements, Side};
 use raytrace::integrator::path::{Aid, aided_radiance, radiance};
 use raytrace::{DiffuseMode, Film, Settings};
 use support::blocks::ALARM;
 use support::build::{Build, camera};
 use support::files::asset;
 use support::picture::{hybrid, path, shoot, shoot_with, solve};
+use support::solved::area_mean;
 use support::stuff::{lamp, matt, metal};
 
 /// The variance layer of the reference is that of its pixels: squared differences of two independent pictures over the
@@ -119,4 +121,35 @@ fn aided_paths_have_the_mean_of_plain_ones() {
     // One estimate by 80 photons is too large by 1/80, of what the mirror brings.
     let allowed = ALARM * (v + w).sqrt() + 0.02 * share * plain;
     assert!((aided - plain).abs() < allowed && allowed < 0.02 * plain, "{aided}, not {plain}: {allowed}");
+}
+
+/// A dark room beside a bright one, with a gap of 10 cm between: its light is found by one ray in a hundred, and its mean
+/// does not hang on how many are cast. Were only sites cast again whose own rays met the gap, it would be too dark.
+#[test]
+fn light_through_a_gap_has_the_same_mean_with_few_rays() {
+    let m = matt(0.5);
+    let world = Build::new()
+        .room(Vec3::ZERO, Vec3::new(6.0, 3.0, 4.0), [&m; 6])
+        .block(Vec3::new(3.0, -0.1, -0.1), Vec3::new(3.1, 3.1, 3.9), &m)
+        .point_lamp(Vec3::new(1.5, 2.0, 2.0), 100.0)
+        .world();
+    let mean = |config: &Config| {
+        let solution = radiosity::solve(&world, config, &()).expect("finite");
+        area_mean(
+            &world,
+            |_| true,
+            |t, u, v| {
+                let at = world.scene.mesh.interpolate(t, u, v, &world.scene.mesh.positions);
+                if at.x > 3.2 { solution.irradiance(&world, t, u, v, Side::Front) } else { Rgb::BLACK }
+            },
+        )
+    };
+    // One mesh for all: which leaves few rays would split is another question.
+    let one_mesh = Config { most_sites: 1500, rounds: 0, ..Config::for_error(0.05) };
+    let exact = mean(&Config { rays: 2048, noise: f32::INFINITY, ..one_mesh.clone() });
+    let few = |seed| mean(&Config { rays: 64, noise: 0.05, seed, ..one_mesh.clone() }) / exact;
+    let few: Vec<f64> = (0..16).map(few).collect();
+    let average = few.iter().sum::<f64>() / few.len() as f64;
+    // By their own luck it was 0.915.
+    assert!((average - 1.0).abs() < 0.03, "{average} of {exact} lx: {few:.3?}");
 }
