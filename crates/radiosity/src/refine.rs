@@ -305,7 +305,11 @@ impl<'a> Refiner<'a> {
                         (true, true) => {
                             let (va, vb) = (values[sa], values[sb]);
                             let lit = lit[sa].mean().min(lit[sb].mean());
-                            promise((va - vb).map(f32::abs).mean(), 0.5 * (va + vb).mean(), lit, sa)
+                            // What the rays' own noise explains promises nothing.
+                            let noise = self.field.variance(sa) + self.field.variance(sb);
+                            let difference = (va - vb).map(f32::abs).mean();
+                            let beyond = (difference * difference - noise).max(0.0).sqrt();
+                            promise(beyond, 0.5 * (va + vb).mean(), lit, sa)
                         }
                         // A buried end says nothing of the rest.
                         _ => 1.0,

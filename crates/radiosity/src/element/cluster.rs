@@ -9,8 +9,9 @@ use geometry::Vec3;
 use std::collections::HashMap;
 use std::hash::BuildHasherDefault;
 
-/// Normals this far apart (chord length, about 29°) count as much as places one radius apart.
-const SIGMA: f32 = 0.5;
+/// Normals this far apart (chord length, about 47°) count as much as places one radius apart. At 0.5 what is round took so
+/// many sites that little was left for the rest: 13 % instead of 12 % in a furnished room of 400 000 triangles.
+const SIGMA: f32 = 0.8;
 
 /// Distance of two vertices for radius `r`, squared.
 pub fn distance2(a: &Vertex, b: &Vertex, r: f32) -> f32 {
