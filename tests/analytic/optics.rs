@@ -1,7 +1,8 @@
 //! Mirrors and glass through the whole renderer, by both integrators: closed forms of plates, balls and series.
 
 use geometry::lobes::{Clearcoat, DiffuseTransmission, Sheen};
-use geometry::{Camera, Material, Rgb, Vec3, World};
+use geometry::{Camera, Light, LightKind, Material, Rgb, Vec3, World};
+use radiosity::Config;
 use raytrace::Settings;
 use std::f32::consts::PI;
 use support::blocks::{ALARM, compare};
@@ -263,4 +264,30 @@ fn a_mirror_throws_a_lamp_on_the_ceiling() {
     assert!((got / direct - 1.0).abs() < 2e-3, "{got} {direct}");
     // The ceiling's own light comes back by the mirror as well: an even ceiling of radiosity B would see F B.
     assert!(indirect > 0.98 * image, "{indirect} {image}");
+}
+
+/// Of the sun that shines on a hectare, what a mirror in a courtyard throws on the wall is a forty-thousandth. It is all there, by
+/// more particles than its share of the light alone would be worth.
+#[test]
+fn a_small_mirror_in_the_sun_gets_its_particles() {
+    let (v, m, mirror, sun) = (Vec3::new, matt(0.5), metal(0.9, 0.0), 10_000.0f32);
+    let reflectance = 0.9 + 0.1 * (1.0 - 0.5f32.sqrt()).powi(5);
+    let mut build = Build::new()
+        .level(-0.01, [-50.0, -50.0], [50.0, 50.0], true, &m)
+        .level(0.0, [-2.0, -2.0], [2.0, 2.0], true, &m)
+        .block(v(2.0, 0.0, -2.0), v(2.2, 3.0, 2.0), &m)
+        .block(v(-2.2, 0.0, -2.0), v(-2.0, 3.0, 2.0), &m)
+        .block(v(-2.0, 0.0, -2.2), v(2.0, 3.0, -2.0), &m)
+        // Half a metre square as seen from above; it throws what comes down at the wall at x = 2.
+        .quad([v(-0.25, 1.5, 0.25), v(0.25, 1.0, 0.25), v(0.25, 1.0, -0.25), v(-0.25, 1.5, -0.25)], &mirror);
+    let kind = LightKind::Directional { direction: -Vec3::Y };
+    build.scene.lights.push(Light { name: "sun".into(), intensity: Rgb::splat(sun), kind });
+    let world = build.world();
+    let solution = radiosity::solve(&world, &Config::for_error(0.04), &()).expect("finite");
+    let (sent, gathered) = (solution.caustics.sent, 2 * solution.report.landings);
+    let (flux, exact) = (solution.report.caustic_flux.g, 0.25 * sun * reflectance);
+    println!("{sent} particles beside {gathered} rays; {flux} of {exact} lm");
+    assert!((flux / exact - 1.0).abs() < 0.02, "{flux} of {exact} lm");
+    // A pilot has 65 536.
+    assert!(sent > 2 * 65_536 && sent < gathered / 9, "{sent} particles beside {gathered} rays");
 }

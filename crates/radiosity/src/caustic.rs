@@ -12,6 +12,7 @@ use geometry::math::offset_origin;
 use geometry::sampling::Rng;
 use geometry::{LightGroups, Mesh, Passage, Ray, Rgb, Vec3, World};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Photons that one estimate of irradiance uses.
 const NEAREST: usize = 80;
@@ -21,6 +22,9 @@ const BATCH: usize = 4096;
 const PILOT: usize = 16;
 /// Caustics that carry this share of all light get all the particles asked for; those that carry less, fewer.
 const MATTERS: f32 = 0.05;
+/// So many of the rays that gathering took they may take in any case: of a sun most light falls outside, and the little that
+/// chairs of steel throw about a room is much of what is seen there.
+const CHEAP: f32 = 0.1;
 /// Surfaces a particle meets at most.
 const LONGEST: usize = 32;
 /// Photons kept at most (56 bytes each).
@@ -66,14 +70,17 @@ pub struct Caustics {
 impl Caustics {
     /// Sends `particles` from the emitters, fewer when little light comes this way; none when nothing in the scene reflects or refracts sharply.
     pub fn trace(world: &World, elements: &Elements, particles: usize, seed: u64) -> Caustics {
-        Caustics::trace_groups(world, elements, particles, seed, None)
+        Caustics::trace_groups(world, elements, particles, 0, seed, None)
     }
 
     /// The same, each photon with the group of lights that it came from.
+    ///
+    /// - `gathered`: rays that gathering took.
     pub(crate) fn trace_groups(
         world: &World,
         elements: &Elements,
         particles: usize,
+        gathered: usize,
         seed: u64,
         groups: Option<&LightGroups>,
     ) -> Caustics {
@@ -81,13 +88,15 @@ impl Caustics {
         if targets.is_empty() || world.emitters.is_empty() {
             return Caustics::default();
         }
+        let rays = AtomicUsize::new(0);
         let batches = |which: std::ops::Range<usize>| -> Vec<Photon> {
             let send_batch = |batch: usize| {
-                let mut landed = Vec::new();
+                let (mut landed, mut cast) = (Vec::new(), 0);
                 for i in 0..BATCH {
                     let mut rng = Rng::new(seed ^ 0x7068_6f74_6f6e, (batch * BATCH + i) as u64);
-                    send(world, &targets, groups, &mut rng, &mut landed);
+                    cast += send(world, &targets, groups, &mut rng, &mut landed);
                 }
+                rays.fetch_add(cast, Ordering::Relaxed);
                 landed
             };
             which.into_par_iter().flat_map_iter(send_batch).collect()
@@ -97,7 +106,10 @@ impl Caustics {
         let mut photons = batches(0..pilot);
         let flux = photons.iter().map(|p| p.flux.luminance()).sum::<f32>() / (pilot * BATCH) as f32;
         let power: f32 = world.emitters.power().iter().map(|p| p.luminance()).sum();
-        let wanted = particles as f32 * (flux / (MATTERS * power).max(1e-30)).min(1.0);
+        let each = rays.load(Ordering::Relaxed) as f32 / (pilot * BATCH) as f32;
+        let cheap = if photons.is_empty() { 0.0 } else { CHEAP * gathered as f32 / each.max(1.0) };
+        let wanted = (particles as f32 * (flux / (MATTERS * power).max(1e-30)).min(1.0))
+            .max(cheap.min(particles as f32));
         let last = (wanted as usize / BATCH).max(pilot);
         photons.extend(batches(pilot..last));
         let share = 1.0 / (last * BATCH) as f32;
@@ -306,23 +318,23 @@ fn targets(world: &World, elements: &Elements) -> Vec<(Vec3, f32)> {
     spheres
 }
 
-/// One particle's way.
+/// One particle's way; how many rays it took.
 fn send(
     world: &World,
     targets: &[(Vec3, f32)],
     groups: Option<&LightGroups>,
     rng: &mut Rng,
     landed: &mut Vec<Photon>,
-) {
+) -> usize {
     let u = rng.array();
-    let Some(start) = world.emitters.emit_toward(&world.scene, targets, u) else { return };
+    let Some(start) = world.emitters.emit_toward(&world.scene, targets, u) else { return 0 };
     let mut flux = start.flux;
     let mut ray = start.ray;
     let mut specular = 0;
     let mut rough_first = false;
     let mut passage = Passage::default();
-    for _ in 0..LONGEST {
-        let Some(hit) = world.bvh.closest_hit(&ray) else { return };
+    for cast in 1..=LONGEST {
+        let Some(hit) = world.bvh.closest_hit(&ray) else { return cast };
         let mut surface = world.surface(&ray, &hit);
         flux *= passage.meet(&mut surface, hit.t - ray.t_min, rng);
         surface.bsdf = surface.bsdf.with_transport(Transport::Importance);
@@ -331,7 +343,7 @@ fn send(
             continue;
         }
         if surface.unlit.is_some() || !flux.is_finite() {
-            return;
+            return cast;
         }
         let counted_by_gathering = specular == 0 || (specular == 1 && rough_first);
         if !counted_by_gathering && (surface.bsdf.has_diffuse() || surface.bsdf.is_translucent()) {
@@ -349,10 +361,10 @@ fn send(
         let wi = -ray.direction;
         let p_on = surface.bsdf.specular_albedo(wi).luminance().min(1.0);
         if p_on <= 0.0 || rng.f32() >= p_on {
-            return;
+            return cast;
         }
         let u = [rng.f32(), rng.f32(), rng.f32()];
-        let Some(next) = surface.bsdf.sample_specular(wi, u) else { return };
+        let Some(next) = surface.bsdf.sample_specular(wi, u) else { return cast };
         flux *= next.weight * (1.0 / p_on);
         if !next.straight {
             specular += 1;
@@ -362,6 +374,7 @@ fn send(
         let away = if next.wi.dot(surface.ng) > 0.0 { surface.ng } else { -surface.ng };
         ray = Ray::new(offset_origin(surface.position, away), next.wi);
     }
+    LONGEST
 }
 
 /// Arranges `photons` as a balanced k-d tree, each range divided along its longest axis.
