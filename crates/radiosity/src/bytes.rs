@@ -1,5 +1,6 @@
 //! Numbers as bytes, little-endian, and back: what files are made of.
 
+use crate::doubt::Doubt;
 use crate::element::{Node, Side, Vertex};
 use crate::field::Source;
 use geometry::{Rgb, Vec3};
@@ -58,6 +59,7 @@ macro_rules! record {
 pub(crate) use record;
 
 record!(Rgb { r: f32, g: f32, b: f32 } => Rgb { r, g, b });
+record!(Doubt { mesh: f32, ray: f32 } => Doubt { mesh, ray });
 record!(Vec3 { x: f32, y: f32, z: f32 } => Vec3 { x, y, z });
 record!(Vertex { position: Vec3, normal: Vec3, piece: u32, face: u32 } => Vertex { position, normal, piece, face });
 record!(Node { vertices: [u32; 3], child: u32, edge: u8 } => Node { vertices, child, edge });

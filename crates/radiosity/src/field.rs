@@ -7,6 +7,8 @@ use geometry::math::offset_origin;
 use geometry::{Ray, Rgb, World};
 use rayon::prelude::*;
 use std::collections::HashMap;
+use std::iter::Sum;
+use std::ops::{Add, Mul};
 
 /// One side of one vertex where rays were gathered.
 #[derive(Clone, Debug)]
@@ -46,15 +48,18 @@ impl Sources {
     }
 
     /// From a value at each site to a value at each slot.
-    pub(crate) fn spread(&self, e: &[Rgb]) -> Vec<Rgb> {
+    pub(crate) fn spread<T>(&self, e: &[T]) -> Vec<T>
+    where
+        T: Copy + Default + Send + Sync + Add<Output = T> + Mul<f32, Output = T> + Sum,
+    {
         let value = |source: &Source| match source {
-            Source::Nothing | Source::Between(..) => Rgb::BLACK,
+            Source::Nothing | Source::Between(..) => T::default(),
             Source::Site(i) => e[*i as usize],
             Source::Near(sites, weights) => {
                 sites.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(&i, &w)| e[i as usize] * w).sum()
             }
         };
-        let mut values: Vec<Rgb> = self.0.par_iter().map(value).collect();
+        let mut values: Vec<T> = self.0.par_iter().map(value).collect();
         // The ends of an edge are older than its middle, so they have their values by now.
         for (slot, source) in self.0.iter().enumerate() {
             if let Source::Between(a, b) = *source {

@@ -226,7 +226,7 @@ pub fn row(
 
 /// Share of the variance of independent rays that a lattice of `rays` leaves: about half of it with 64; its error falls
 /// with rays^-0.8 (128 → 3.3 %, 1024 → 0.67 %, measured).
-pub(crate) fn lattice_share(rays: u32) -> f32 {
+pub fn lattice_share(rays: u32) -> f32 {
     0.5 * (64.0 / rays as f32).powf(0.6)
 }
 

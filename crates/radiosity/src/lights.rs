@@ -143,8 +143,16 @@ impl Solution {
     }
 
     fn scaled(&self, at_sites: &AtSites, lights: &Lights, factors: &[Rgb]) -> Solution {
+        let indirect = mixed(&lights.indirect, factors);
+        // Of other light the same share is in doubt.
+        let brighter = |(now, then): (&Rgb, &Rgb)| match then.mean() {
+            0.0 => 1.0,
+            then => (now.mean() / then).powi(2).min(1e12),
+        };
+        let brighter = indirect.iter().zip(&at_sites.indirect).map(brighter);
         let at_sites = AtSites {
-            indirect: mixed(&lights.indirect, factors),
+            doubts: at_sites.doubts.iter().zip(brighter).map(|(&doubt, by)| doubt * by).collect(),
+            indirect,
             direct: mixed(&lights.direct, factors),
             ..at_sites.clone()
         };

@@ -5,9 +5,9 @@
 //! Probab. Appl. 35, 1991). What the rays cannot tell from even light is treated as even; what they can stays. A fit of
 //! the first order smoothed corners away: as much bias won as noise lost, in a Cornell box.
 
-use crate::element::{Side, slot};
 use crate::field::Field;
 use crate::flags::Flags;
+use crate::neighbours::Graph;
 use crate::refine::Refiner;
 use geometry::math::frame;
 use geometry::{Rgb, Vec3};
@@ -25,51 +25,6 @@ const AGREE: f32 = 2.0;
 /// Normals further apart than this (cosine) look at other things.
 const ALIKE: f32 = 0.95;
 
-/// Neighbours of every site across the leaves, in CSR form.
-struct Graph {
-    starts: Vec<u32>,
-    neighbours: Vec<u32>,
-}
-
-impl Graph {
-    /// Sites are neighbours when they speak for corners of one leaf that nothing pierces and the mesh resolves.
-    fn new(refiner: &Refiner, flags: &Flags) -> Graph {
-        let (elements, field) = (&refiner.elements, &refiner.field);
-        let mut pairs: Vec<(u32, u32)> = Vec::new();
-        for leaf in elements.leaves() {
-            let corners = elements.nodes[leaf as usize].vertices;
-            for side in Side::BOTH {
-                if flags.pierced(leaf, side) || flags.unresolved(leaf, side) {
-                    continue;
-                }
-                let sites = corners.map(|v| field.loudest(slot(v, side)));
-                for (a, b) in [(0, 1), (1, 2), (2, 0)] {
-                    if let (Some(a), Some(b)) = (sites[a], sites[b])
-                        && a != b
-                    {
-                        pairs.extend([(a, b), (b, a)]);
-                    }
-                }
-            }
-        }
-        pairs.par_sort_unstable();
-        pairs.dedup();
-        let mut starts = vec![0u32; field.sites.len() + 1];
-        for &(a, _) in &pairs {
-            starts[a as usize + 1] += 1;
-        }
-        for i in 1..starts.len() {
-            starts[i] += starts[i - 1];
-        }
-        Graph { starts, neighbours: pairs.into_iter().map(|p| p.1).collect() }
-    }
-
-    fn of(&self, site: u32) -> &[u32] {
-        let range = self.starts[site as usize] as usize..self.starts[site as usize + 1] as usize;
-        &self.neighbours[range]
-    }
-}
-
 /// For each site those whose values make up its own with less noise, and their weights: see the head of this file. None
 /// where its own value stands.
 #[derive(Clone, Debug, Default)]
@@ -84,13 +39,27 @@ impl Smoothing {
         };
         e.par_iter().zip(&self.0).map(value).collect()
     }
+
+    /// Whether what is around a site made its value.
+    pub(crate) fn fits(&self, site: u32) -> bool {
+        !self.0[site as usize].is_empty()
+    }
+
+    /// Variance that smoothing leaves of `variance` of the sites' values, at one of them.
+    pub(crate) fn variance(&self, site: u32, variance: &[f32]) -> f32 {
+        match self.0[site as usize].as_slice() {
+            [] => variance[site as usize],
+            fit => fit.iter().map(|&(s, w)| w * w * variance[s as usize]).sum(),
+        }
+    }
 }
 
 /// How the present values at the sites are to be smoothed.
 ///
 /// - `variance`: of each site's value (mean of the channels), lx².
 pub(crate) fn smoothing(refiner: &Refiner, flags: &Flags, variance: &[f32]) -> Smoothing {
-    let graph = Graph::new(refiner, flags);
+    let resolved = |leaf, side| !flags.pierced(leaf, side) && !flags.unresolved(leaf, side);
+    let graph = Graph::new(refiner, resolved);
     // A site's own rays are poor witnesses of their noise: those that missed the bright patch know nothing of it. What
     // its neighbours saw counts as well.
     let pooled: Vec<f32> = (0..refiner.e.len() as u32)

@@ -1,6 +1,7 @@
 //! E at vertices and anywhere between, and what the solve reports.
 
 use crate::caustic::Caustics;
+use crate::doubt::Doubt;
 use crate::element::{Elements, Side, slot};
 use crate::field::Sources;
 use crate::flags::{Flags, visible_weights};
@@ -10,6 +11,9 @@ use crate::solver::Convergence;
 use geometry::{Hit, Ray, Rgb, Surface, Vec3, World};
 use rayon::prelude::*;
 
+/// Relative error of a leaf that has a corner of which nothing is known.
+const GUESS: f32 = 0.5;
+
 /// The solved prepass: indirect irradiance everywhere on the scene's surfaces. It belongs to the world it was solved for.
 #[derive(Clone, Debug)]
 pub struct Solution {
@@ -18,6 +22,8 @@ pub struct Solution {
     values: Vec<Rgb>,
     usable: Vec<bool>,
     pub(crate) flags: Flags,
+    /// How far each slot's value may be off; empty when that is not known.
+    doubts: Vec<Doubt>,
     /// Direct irradiance at each slot, lx: for the `vertex` mode and for baking.
     direct: Vec<Rgb>,
     /// Photons' irradiance at each slot, lx; empty when there are none.
@@ -39,6 +45,8 @@ pub(crate) struct AtSites {
     pub indirect: Vec<Rgb>,
     /// Direct irradiance, lx.
     pub direct: Vec<Rgb>,
+    /// How far the indirect irradiance may be off.
+    pub doubts: Vec<Doubt>,
     /// The same by groups of lights, where these are kept apart.
     pub lights: Option<Lights>,
 }
@@ -149,11 +157,13 @@ impl Solution {
         refiner: Refiner,
         flags: Flags,
         direct: Vec<Rgb>,
+        doubts: Vec<Doubt>,
         lights: Option<Lights>,
         caustics: Caustics,
         report: Report,
     ) -> Solution {
-        let at_sites = AtSites { sources: refiner.field.sources, indirect: refiner.e, direct, lights };
+        let at_sites =
+            AtSites { sources: refiner.field.sources, indirect: refiner.e, direct, doubts, lights };
         Solution::of_sites(refiner.elements, flags, at_sites, caustics, report)
     }
 
@@ -170,6 +180,7 @@ impl Solution {
             values: sources.spread(&at_sites.indirect),
             usable: (0..sources.0.len()).into_par_iter().map(|s| sources.usable(s)).collect(),
             direct: sources.spread(&at_sites.direct),
+            doubts: sources.spread(&at_sites.doubts),
             caustic_values: caustics.at_vertices(&elements, |slot| sources.usable(slot)),
             elements,
             flags,
@@ -195,6 +206,7 @@ impl Solution {
             usable,
             flags: Flags::default(),
             direct,
+            doubts: Vec::new(),
             caustic_values,
             caustics,
             at_sites: None,
@@ -219,6 +231,28 @@ impl Solution {
             return Rgb::BLACK;
         }
         self.interpolate(world, triangle, u, v, side, &self.caustic_values)
+    }
+
+    /// How far [`Solution::irradiance`] may be off at this place; infinitely where it knows nothing.
+    pub fn doubt(&self, triangle: u32, u: f32, v: f32, side: Side) -> Doubt {
+        if self.doubts.is_empty() || self.elements.piece(triangle).is_none() {
+            return Doubt::default();
+        }
+        let (node, w) = self.elements.locate(triangle, u, v);
+        let slots = self.elements.nodes[node as usize].vertices.map(|v| slot(v, side));
+        let usable = || slots.iter().zip(w).filter(|(s, _)| self.usable[**s]);
+        let sum: f32 = usable().map(|(_, w)| w).sum();
+        // On a side that no light reaches there is nothing to be known.
+        let reached = self.flags.unresolved(node, side);
+        if sum <= 1e-6 {
+            return Doubt { mesh: if reached { f32::INFINITY } else { 0.0 }, ray: 0.0 };
+        }
+        let doubt = usable().map(|(&s, w)| self.doubts[s] * w).sum::<Doubt>() * (1.0 / sum);
+        // What a buried corner would have said is anybody's guess, and where it lies shadows are near.
+        let e: f32 = usable().map(|(&s, w)| self.values[s].mean() * w).sum::<f32>() / sum;
+        let buried = reached && slots.iter().any(|&s| !self.usable[s]);
+        let guess = if buried { (GUESS * e).powi(2) } else { 0.0 };
+        Doubt { mesh: doubt.mesh + guess, ..doubt }
     }
 
     /// Whether the mesh does not resolve the light at this place, and the one who asks should gather for itself.

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! "twolight"                        8 bytes
-//! format                            u32, 2
+//! format                            u32, 3
 //! number of sections                u32
 //! for each: name, length, BLAKE3    8 + 8 + 32 bytes
 //! BLAKE3 of all that                32 bytes
@@ -11,11 +11,12 @@
 //!
 //! All numbers are little-endian; lists begin with their length as u64. `about` is text, a line "key: value" each. `mesh`
 //! holds vertices and nodes of the element mesh, `sources` how each slot (2 · vertex + side) draws on the sites, `sites`
-//! the indirect and the direct irradiance there (lx), `flags` what pass 2 is to mistrust, `photons` a k-d tree, `lights`
+//! the indirect and the direct irradiance there (lx) and the doubts of the former (lx²), `flags` what pass 2 is to mistrust, `photons` a k-d tree, `lights`
 //! the groups of lamps and the light of each by itself. Every section is checked before it is believed.
 
 use crate::bytes::{Plain, Reader, get_sources, put_all, put_sources};
 use crate::caustic::Caustics;
+use crate::doubt::Doubt;
 use crate::element::{Elements, MIDDLE, Node, Vertex, VertexId};
 use crate::field::{Source, Sources};
 use crate::flags::Flags;
@@ -28,7 +29,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 const MAGIC: &[u8; 8] = b"twolight";
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 const SECTIONS: [&str; 7] = ["about", "mesh", "sources", "sites", "flags", "photons", "lights"];
 /// Bytes of a section's line in the table.
 const LINE: usize = 8 + 8 + 32;
@@ -116,6 +117,7 @@ pub fn encode(solution: &Solution, world: &World, about: &About) -> Result<Vec<u
     put_sources(&at_sites.sources.0, sources);
     put_all(&at_sites.indirect, sites);
     put_all(&at_sites.direct, sites);
+    put_all(&at_sites.doubts, sites);
     put_report(&solution.report, sites);
     put_all(solution.flags.bits(), flags);
     solution.caustics.put(photons);
@@ -148,9 +150,8 @@ pub fn decode(bytes: &[u8], world: &World) -> Result<(Solution, About), FileErro
     let triangles = world.scene.mesh.triangles.len();
     let elements = whole(mesh, |r| get_elements(r, triangles)).ok_or(senseless("mesh"))?;
     let slots = 2 * elements.vertices.len();
-    let (indirect, direct, report) =
-        whole(sites, |r| Some((r.all::<Rgb>()?, r.all::<Rgb>()?, get_report(r)?)))
-            .ok_or(senseless("sites"))?;
+    let get = |r: &mut Reader| Some((r.all::<Rgb>()?, r.all::<Rgb>()?, r.all::<Doubt>()?, get_report(r)?));
+    let (indirect, direct, doubts, report) = whole(sites, get).ok_or(senseless("sites"))?;
     let count = indirect.len();
     let sources = whole(sources, get_sources)
         .filter(|all| all.len() == slots && all.iter().enumerate().all(|(s, source)| fits(source, s, count)))
@@ -161,10 +162,15 @@ pub fn decode(bytes: &[u8], world: &World) -> Result<(Solution, About), FileErro
     let lights = whole(lamps, |r| get_lights(r, count)).ok_or(senseless("lights"))?;
     let caustics = whole(photons, |r| Caustics::get(r, &world.scene.mesh, lights.groups.len()))
         .ok_or(senseless("photons"))?;
-    if direct.len() != count || !indirect.iter().chain(&direct).all(|e| e.is_finite()) {
+    let sound = |d: &Doubt| d.mesh >= 0.0 && d.ray >= 0.0 && d.mesh.is_finite() && d.ray.is_finite();
+    if direct.len() != count
+        || doubts.len() != count
+        || !doubts.iter().all(sound)
+        || !indirect.iter().chain(&direct).all(|e| e.is_finite())
+    {
         return Err(senseless("sites"));
     }
-    let at_sites = AtSites { sources: Sources(sources), indirect, direct, lights: Some(lights) };
+    let at_sites = AtSites { sources: Sources(sources), indirect, direct, doubts, lights: Some(lights) };
     let solution = Solution::of_sites(elements, Flags::of_bits(flags), at_sites, caustics, report);
     Ok((solution.into_relit(world)?, about))
 }

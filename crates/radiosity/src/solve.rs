@@ -1,6 +1,7 @@
 //! The whole prepass: mesh, gather, refine, photons, solve.
 
 use crate::caustic::Caustics;
+use crate::doubt;
 use crate::importance::Importance;
 use crate::journal::Journal;
 use crate::lights::Lights;
@@ -181,6 +182,7 @@ pub fn solve_resumable(
     }
     refiner.e = e;
     let smoothing = smooth::smoothing(&refiner, &flags, &variance);
+    let doubts = doubt::of_sites(&refiner, &variance, &smoothing);
     refiner.e = smoothing.apply(&refiner.e);
     let parts = parts.iter().map(|part| smoothing.apply(part)).collect();
     let (direct, direct_parts) = refiner.direct(config.light_samples);
@@ -200,5 +202,5 @@ pub fn solve_resumable(
         indirect: parts,
         direct: direct_parts,
     });
-    Ok(Solution::new(refiner, flags, direct, lights, caustics, report))
+    Ok(Solution::new(refiner, flags, direct, doubts, lights, caustics, report))
 }

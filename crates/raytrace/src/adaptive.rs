@@ -68,7 +68,9 @@ impl<'a> Adaptive<'a> {
     }
 
     fn shade(&self, i: u32, effort: Effort) -> Shot {
-        shade(self.hybrid, self.view, i % self.view.width, i / self.view.width, effort, self.seed)
+        let before = self.shots.get(i as usize).and_then(Option::as_ref);
+        let (x, y) = (i % self.view.width, i / self.view.width);
+        shade(self.hybrid, self.view, x, y, effort, before, self.seed)
     }
 
     /// The picture, with the noise that is estimated for each pixel, and the error that this amounts to.

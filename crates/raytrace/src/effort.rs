@@ -327,6 +327,7 @@ mod tests {
                 camera_variance: 0.0,
                 light_variance: 0.0,
                 specular: false,
+                gathered: None,
             })
         };
         (0..64 * 64).map(shot).collect()

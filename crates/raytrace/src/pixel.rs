@@ -1,7 +1,8 @@
 //! One pixel of the hybrid picture: as many rays through it as it needs, each surface they find shaded once.
 
 use crate::film::Pixel;
-use crate::integrator::hybrid::{Hybrid, Photons, Quality};
+use crate::integrator::final_gather::Gathered;
+use crate::integrator::hybrid::{Gather, Hybrid, Photons, Quality};
 use geometry::sampling::Rng;
 use geometry::{Camera, MaterialId, Projection, Ray, Rgb, Surface, Vec3, World};
 use radiosity::Progress;
@@ -85,6 +86,8 @@ pub struct Shot {
     pub light_variance: f32,
     /// Rays through the pixel go on by way of mirrors, glass or gloss.
     pub specular: bool,
+    /// What the surface gathered that covers most of the pixel.
+    pub gathered: Option<Gathered>,
 }
 
 /// One surface seen through a pixel: hits that belong together.
@@ -93,8 +96,16 @@ struct Group {
     hits: Vec<usize>,
 }
 
-/// Shades pixel (x, y).
-pub fn shade(hybrid: &Hybrid, view: &View, x: u32, y: u32, effort: Effort, seed: u64) -> Shot {
+/// Shades pixel (x, y); what was gathered `before` is not gathered again.
+pub fn shade(
+    hybrid: &Hybrid,
+    view: &View,
+    x: u32,
+    y: u32,
+    effort: Effort,
+    before: Option<&Shot>,
+    seed: u64,
+) -> Shot {
     let mut rng = Rng::new(seed ^ u64::from(effort.camera) << 40, u64::from(y) << 32 | u64::from(x));
     let n = effort.camera;
     let side = (n as f32).sqrt().round() as u32;
@@ -108,6 +119,7 @@ pub fn shade(hybrid: &Hybrid, view: &View, x: u32, y: u32, effort: Effort, seed:
         camera_variance: 0.0,
         light_variance: 0.0,
         specular: false,
+        gathered: None,
     };
     let mut sky = Rgb::BLACK;
     for i in 0..n {
@@ -131,14 +143,19 @@ pub fn shade(hybrid: &Hybrid, view: &View, x: u32, y: u32, effort: Effort, seed:
     }
     let mut largest = 0;
     for g in &groups {
-        let before = shot.pixel.beauty().luminance();
-        one_surface(hybrid, g, &hits, effort, share, phase(x, y, seed), &mut shot, &mut rng);
+        let so_far = shot.pixel.beauty().luminance();
+        let known =
+            before.filter(|b| b.key.is_some_and(|key| key.continues(&g.key))).and_then(|b| b.gathered);
+        let gather = known.map_or(Gather::Worth(g.hits.len() as f32 * share), Gather::Done);
+        let gathered =
+            one_surface(hybrid, g, &hits, effort, gather, share, phase(x, y, seed), &mut shot, &mut rng);
         let part = g.hits.len() as f32 * share;
-        levels.push((part, (shot.pixel.beauty().luminance() - before) / part));
+        levels.push((part, (shot.pixel.beauty().luminance() - so_far) / part));
         if g.hits.len() > largest {
             largest = g.hits.len();
             shot.pixel.position = g.key.position;
             shot.key = Some(g.key);
+            shot.gathered = gathered;
         }
     }
     let mean: f32 = levels.iter().map(|&(p, l)| p * l).sum();
@@ -203,16 +220,18 @@ fn group(hits: &[(Ray, Surface)], view: &View) -> Vec<Group> {
 }
 
 /// Adds the light of one surface: its diffuse part once, at the hit nearest its middle; its specular part for each ray.
+/// Returns what it gathered.
 fn one_surface(
     hybrid: &Hybrid,
     g: &Group,
     hits: &[(Ray, Surface)],
     effort: Effort,
+    gather: Gather,
     share: f32,
     phase: u32,
     shot: &mut Shot,
     rng: &mut Rng,
-) {
+) -> Option<Gathered> {
     let count = g.hits.len() as f32;
     let part = count * share;
     let middle = g.hits.iter().map(|&i| hits[i].1.position).sum::<Vec3>() / count;
@@ -238,7 +257,7 @@ fn one_surface(
     let wo = -ray.direction;
     // A sliver of a pixel needs fewer shadow rays for the same noise in the pixel.
     let shadow = if part < 0.3 && effort.shadow > 4 { effort.shadow / 4 } else { effort.shadow };
-    let quality = Quality { shadow, gather: true, photons: Photons::Always };
+    let quality = Quality { shadow, gather, photons: Photons::Always };
     let places: Vec<Vec3> = g.hits.iter().map(|&i| hits[i].1.position).collect();
     let (lit, plan) = hybrid.diffuse(surface, wo, quality, phase, &places, rng);
     let albedo = surface.bsdf.diffuse_albedo(wo);
@@ -283,6 +302,7 @@ fn one_surface(
         shot.sent = albedo.luminance() * surface.coverage / std::f32::consts::PI;
     }
     shot.specular |= surface.bsdf.has_specular() || surface.coverage < 1.0;
+    lit.gathered
 }
 
 /// `light` sent back by a texel of `albedo`, as one of `mean` albedo would send it; where the texel is black in a channel,

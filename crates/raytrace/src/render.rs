@@ -9,12 +9,12 @@ use crate::adaptive::Adaptive;
 use crate::effort::Budget;
 use crate::film::{Film, Pixel};
 use crate::importance::importance;
+use crate::integrator::final_gather::FinalGather;
 use crate::integrator::hybrid::Hybrid;
 use crate::integrator::path;
 use crate::pixel::{View, over_pixels};
 use crate::plan::Plan;
 use crate::verify::{Judgement, Probes, Verdict};
-use geometry::sampling::Lattice2;
 use geometry::{Camera, Rgb, World};
 use radiosity::{Config, Journal, Solution, classical};
 use std::sync::Mutex;
@@ -278,8 +278,8 @@ fn two_passes(
     let mut whole: Option<Outcome> = None;
     loop {
         let solution = made.as_ref().or(solution).expect("given or made");
-        let rays = ((256.0 * (0.02 / mesh_error)) as u32).clamp(64, 1024);
-        let hybrid = Hybrid { world, solution, mode: settings.diffuse, pattern: Lattice2::new(rays) };
+        let gathers = FinalGather::for_error(mesh_error, solution.report.mean.mean());
+        let hybrid = Hybrid { world, solution, mode: settings.diffuse, gathers };
         let before = world.bvh.rays_cast();
         let mut picture = Adaptive::new(&hybrid, view, settings.seed);
         let mut finished = picture.start(watch);

@@ -2,12 +2,13 @@
 
 use super::Light;
 use crate::direct::{Gloss, Plan, Spend, direct};
-use crate::integrator::hybrid::{Diffuse, Hybrid, Photons, Quality};
+use crate::integrator::final_gather::FinalGather;
+use crate::integrator::hybrid::{Diffuse, Gather, Hybrid, Photons, Quality};
 use crate::render::DiffuseMode;
 use geometry::bsdf::{Bsdf, Shading};
 use geometry::math::offset_origin;
 use geometry::photometry::reflected_radiance;
-use geometry::sampling::{Lattice2, Rng};
+use geometry::sampling::Rng;
 use geometry::surface::base_color_at;
 use geometry::{Hit, Ray, Rgb, Surface, World};
 use radiosity::Solution;
@@ -59,8 +60,8 @@ pub struct Lamp<'a> {
 impl<'a> Lamp<'a> {
     /// - `shadow`: shadow rays of each look.
     pub fn new(world: &'a World, solution: &'a Solution, shadow: u32) -> Lamp<'a> {
-        let by_vertices =
-            Hybrid { world, solution, mode: DiffuseMode::Split, pattern: Lattice2::new(GATHER_RAYS) };
+        let gathers = FinalGather::new(GATHER_RAYS, DOUBTED, solution.report.mean.mean());
+        let by_vertices = Hybrid { world, solution, mode: DiffuseMode::Split, gathers };
         let by_rays = Hybrid { mode: DiffuseMode::Gather, ..by_vertices.clone() };
         Lamp { by_vertices, by_rays, shadow }
     }
@@ -110,7 +111,7 @@ impl<'a> Lamp<'a> {
 
     fn shine(&self, spot: &Spot, rng: &mut Rng) -> (Diffuse, Plan) {
         let hybrid = if spot.known { &self.by_vertices } else { &self.by_rays };
-        let quality = Quality { shadow: self.shadow, gather: true, photons: Photons::Always };
+        let quality = Quality { shadow: self.shadow, gather: Gather::Worth(1.0), photons: Photons::Always };
         let phase = rng.below(16);
         hybrid.diffuse(&spot.surface, spot.surface.ng, quality, phase, &[spot.surface.position], rng)
     }
@@ -170,7 +171,10 @@ const CLOSE: f32 = 0.004;
 const DARK: f32 = 0.1;
 
 /// Rays of a gather in one look: many looks make up a vertex or a texel's neighbourhood.
-const GATHER_RAYS: u32 = 16;
+const GATHER_RAYS: u32 = 64;
+/// Relative error of the mesh from which on a look gathers: where it knows next to nothing. Where what is gathered meets what
+/// is not, light has a step that vertices had to follow: at 0.25 they were off by 2.2 % instead of 1.7 %.
+const DOUBTED: f32 = 1.0;
 
 /// The surface at `place`, looked at along its normal.
 fn surface_at(world: &World, place: Place) -> Surface {

@@ -6,6 +6,7 @@
 //! rays that looked for the same light.
 
 use super::Layers;
+use super::final_gather::{FinalGather, Gathered, trust};
 use crate::direct::{Direct, Gloss, Plan, Spend, direct};
 use crate::render::DiffuseMode;
 use geometry::bsdf::BsdfSample;
@@ -38,10 +39,21 @@ const CAUSTIC_PLACES: usize = 16;
 pub struct Quality {
     /// Shadow rays: see [`Spend`].
     pub shadow: u32,
-    /// Whether to gather at the surface where the mode or an unresolved mesh asks for it: for what the eye sees directly.
-    pub gather: bool,
+    /// Whether to gather at the surface, where the mode or doubt of the mesh asks for it: for what the eye sees directly.
+    pub gather: Gather,
     /// Where to look caustics up photon by photon.
     pub photons: Photons,
+}
+
+/// Whether to gather at a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Gather {
+    /// Believe the mesh.
+    Never,
+    /// Where it is worth it, for a surface that fills this share of a pixel.
+    Worth(f32),
+    /// It was done before.
+    Done(Gathered),
 }
 
 /// Where caustics are looked up photon by photon; elsewhere the vertices' blurred ones will do.
@@ -64,8 +76,8 @@ pub struct Hybrid<'a> {
     pub solution: &'a Solution,
     /// Where a diffuse surface's light comes from.
     pub mode: DiffuseMode,
-    /// Rays of a gather for one pixel.
-    pub pattern: Lattice2,
+    /// What surfaces may spend on gathers of their own.
+    pub gathers: FinalGather,
 }
 
 /// Diffuse light of one surface toward the eye.
@@ -85,6 +97,8 @@ pub struct Diffuse {
     pub variance: f32,
     /// The same from a gather.
     pub gather_variance: f32,
+    /// What was gathered, if anything was.
+    pub gathered: Option<Gathered>,
 }
 
 impl Hybrid<'_> {
@@ -163,28 +177,25 @@ impl Hybrid<'_> {
             (out.irradiance, out.straight) = (e, Rgb::BLACK);
             out.variance = 0.0;
         }
-        let gathers = match self.mode {
-            DiffuseMode::Vertex => false,
-            DiffuseMode::Split => quality.gather && self.solution.unresolved(t, u, v, side),
-            DiffuseMode::Gather => quality.gather,
-        };
         let mut e = self.solution.irradiance(self.world, t, u, v, side);
-        if gathers {
-            let (gathered, variance) = self.gather(surface, rng);
-            let difference = gathered - e;
-            // In `split` the gather corrects the vertices, by what its own noise does not explain (James and Stein's
-            // shrinkage); in `gather` it stands for itself.
-            let trust = match self.mode {
-                DiffuseMode::Gather => 1.0,
-                // Where the mesh knows nothing there is nothing to correct.
-                _ if e.is_black() => 1.0,
-                // Eight times, so that a few lucky rays, whose own spread is their only witness, are not believed:
-                // four left white specks on a ceiling over chrome chairs.
-                _ => (1.0 - 8.0 * variance / difference.luminance().powi(2).max(1e-30)).max(0.0),
-            };
-            e += difference * trust;
+        let doubt = self.solution.doubt(t, u, v, side);
+        let light = e.mean() + out.straight.mean();
+        out.gathered = match (self.mode, quality.gather) {
+            (DiffuseMode::Vertex, _) | (_, Gather::Never) => None,
+            (_, Gather::Done(gathered)) => Some(gathered),
+            (DiffuseMode::Split, Gather::Worth(part)) => {
+                self.gathers.rays(doubt, light, part).map(|rays| self.gather(surface, rays, rng))
+            }
+            (DiffuseMode::Gather, Gather::Worth(part)) => {
+                Some(self.gather(surface, self.gathers.all_rays(part), rng))
+            }
+        };
+        if let Some(gathered) = out.gathered {
+            // In `split` it corrects the vertices, in `gather` it stands for itself.
+            let trust = if self.mode == DiffuseMode::Gather { 1.0 } else { trust(doubt, gathered.rays) };
+            e += (gathered.e - e) * trust;
             let seen = photometry::reflected_radiance(albedo, Rgb::WHITE).luminance();
-            out.gather_variance = trust * trust * variance * seen * seen;
+            out.gather_variance = trust * trust * gathered.variance * seen * seen;
         }
         // Only what the eye sees directly, or nearly so, needs a caustic's own sharpness; in a mirror only where the
         // vertices know of one.
@@ -223,13 +234,12 @@ impl Hybrid<'_> {
         }
     }
 
-    /// Indirect irradiance by a gather of rays that read the solution where they end, lx, and the variance of
-    /// its luminance.
-    fn gather(&self, surface: &Surface, rng: &mut Rng) -> (Rgb, f32) {
+    /// Indirect irradiance by a gather of rays that read the solution where they end.
+    fn gather(&self, surface: &Surface, rays: &Lattice2, rng: &mut Rng) -> Gathered {
         let shift = rng.vec2();
         let (mut sum, mut square) = (Rgb::BLACK, 0.0);
-        for i in 0..self.pattern.len() {
-            let wi = to_world(cosine_hemisphere(self.pattern.point(i, shift)), surface.ns);
+        for i in 0..rays.len() {
+            let wi = to_world(cosine_hemisphere(rays.point(i, shift)), surface.ns);
             if wi.dot(surface.ng) <= 0.0 {
                 continue;
             }
@@ -245,10 +255,10 @@ impl Hybrid<'_> {
             sum += brought;
             square += brought.luminance() * brought.luminance();
         }
-        let n = self.pattern.len() as f32;
-        let mean = sum / n;
-        let spread = (square / n - mean.luminance() * mean.luminance()).max(0.0);
-        (mean, 0.5 * spread / n) // a lattice leaves about half of independent rays' variance
+        let n = rays.len() as f32;
+        let e = sum / n;
+        let spread = (square / n - e.luminance() * e.luminance()).max(0.0);
+        Gathered { e, rays: rays.len(), variance: gather::lattice_share(rays.len()) * spread / n }
     }
 
     /// What mirrors, glass and gloss of `surface` show toward `wo`, cd/m², by following one ray for each perfect lobe or
@@ -356,7 +366,7 @@ impl Hybrid<'_> {
         let (diffuse, plan) = self.diffuse(
             surface,
             wo,
-            Quality { shadow, gather: false, photons },
+            Quality { shadow, gather: Gather::Never, photons },
             phase,
             &[surface.position],
             rng,

@@ -1,5 +1,6 @@
 //! Light along one camera ray: which methods there are, and the layers they all sort their light into.
 
+pub mod final_gather;
 pub mod hybrid;
 pub mod path;
 
