@@ -6,6 +6,7 @@
 use geometry::math::Affine2;
 use geometry::texture::Wrap;
 use geometry::{Camera, Material, Texture, TextureRef, Vec2, Vec3, World};
+use radiosity::Config;
 use raytrace::{Film, Settings};
 use std::sync::OnceLock;
 use support::blocks::compare;
@@ -131,4 +132,30 @@ fn fine_print() {
 
 fn print() -> TextureRef {
     TextureRef { texture: 0, uv_set: 0, transform: Affine2::IDENTITY }
+}
+
+/// A mesh of few sites errs and knows where. Asked for half of the light, a picture shows what it says; asked for 2 %, its pixels
+/// gather for themselves where that is not good enough.
+#[test]
+fn pixels_gather_where_a_coarse_mesh_is_in_doubt() {
+    let (scene, cameras) = asset("cornell-box.gltf");
+    let world = World::new(scene);
+    let solved = |config: &Config| radiosity::solve(&world, config, &()).expect("it converges");
+    let coarse = solved(&Config { h0: 0.4, rounds: 0, ..Config::for_error(0.05) });
+    let fine = solved(&Config::for_error(0.01));
+    let indirect = |solution, error| {
+        let settings = Settings { samples: Some(1), ..hybrid(96, 96, error) };
+        let film = shoot_with(&world, &cameras[0], Some(solution), &settings);
+        film.pixels.iter().map(|p| p.indirect.luminance()).collect::<Vec<f32>>()
+    };
+    let truth = indirect(&fine, 0.5);
+    let off = |solution, error| {
+        let picture = indirect(solution, error);
+        let square = |(a, b): (&f32, &f32)| (a - b) * (a - b);
+        let scale: f32 = truth.iter().map(|t| t * t).sum();
+        (picture.iter().zip(&truth).map(square).sum::<f32>() / scale).sqrt()
+    };
+    let [believed, doubted] = [off(&coarse, 0.5), off(&coarse, 0.02)];
+    println!("the mesh is off by {believed}, the picture by {doubted}");
+    assert!(believed > 0.05 && doubted < 0.6 * believed, "{believed} {doubted}");
 }
