@@ -111,6 +111,10 @@ impl Wrap {
 
     /// The texel in [0, n) that stands at index `i` of the endless row.
     fn index(self, i: i64, n: i64) -> i64 {
+        // Divisions are slow, and most look-ups need none.
+        if (0..n).contains(&i) {
+            return i;
+        }
         match self {
             Wrap::Repeat => i.rem_euclid(n),
             Wrap::MirroredRepeat => {

@@ -6,7 +6,7 @@ use crate::transport::Row;
 use geometry::math::offset_origin;
 use geometry::{Ray, Rgb, World};
 use rayon::prelude::*;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::iter::Sum;
 use std::ops::{Add, Mul};
 
@@ -99,6 +99,8 @@ pub struct Field {
     pub(crate) sources: Sources,
     /// The ends of the edge in whose middle a vertex was put, for those that came by refinement.
     parents: HashMap<VertexId, [VertexId; 2]>,
+    /// Sites that `sources` know of.
+    connected: usize,
 }
 
 /// A site most of whose rays first meet a dead side is buried in an object.
@@ -155,25 +157,38 @@ impl Field {
 
     /// Finds for every slot where its value comes from, after sites were added or the mesh was refined.
     ///
-    /// `radius` is the reach of a site ([`crate::element::cluster`]).
+    /// `radius` is the reach of a site ([`crate::element::cluster`]), the same each time: where no site came within it,
+    /// nothing changes.
     pub fn connect(&mut self, world: &World, elements: &Elements, radius: f32) {
         let vertices = &elements.vertices;
         let mut grids = [Grid::new(radius), Grid::new(radius)];
+        // Where a new site may be near, on each side.
+        let mut touched = [HashSet::new(), HashSet::new()];
         let mut site_of = vec![u32::MAX; 2 * vertices.len()];
         for (i, site) in self.sites.iter().enumerate() {
             site_of[slot(site.vertex, site.side)] = i as u32;
             if site.row.dead <= BURIED {
                 grids[site.side.index()].insert(vertices, site.vertex);
+                if i >= self.connected {
+                    let at = vertices[site.vertex as usize].position;
+                    touched[site.side.index()].extend(grids[0].cells_around(at));
+                }
             }
         }
-        let sites = &self.sites;
+        self.connected = self.sites.len();
+        let (sites, before) = (&self.sites, &self.sources.0);
+        let stays = |s: usize| {
+            before.get(s).filter(|_| !touched[s % 2].contains(&grids[0].cell(vertices[s / 2].position)))
+        };
         let sources = (0..site_of.len())
             .into_par_iter()
             .map(|s| {
                 let (v, side) = ((s / 2) as VertexId, Side::BOTH[s % 2]);
                 match site_of[s] {
                     u32::MAX if self.parents.contains_key(&v) => Source::Nothing, // see below
-                    u32::MAX => near(world, vertices, &grids[s % 2], &site_of, v, side),
+                    u32::MAX => stays(s)
+                        .copied()
+                        .unwrap_or_else(|| near(world, vertices, &grids[s % 2], &site_of, v, side)),
                     i if sites[i as usize].row.dead > BURIED => Source::Nothing,
                     i => Source::Site(i),
                 }

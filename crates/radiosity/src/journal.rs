@@ -163,7 +163,7 @@ impl Plain for f16 {
     }
 }
 
-record!(Landing { triangle: u32, uv: [u16; 2], weight: [f16; 3] } => Landing { triangle, uv, weight });
+record!(Landing { node: u32, uv: [u16; 2], weight: [f16; 3] } => Landing { node, uv, weight });
 
 fn put_rows(rows: &[Row]) -> Vec<u8> {
     let mut out = Vec::new();

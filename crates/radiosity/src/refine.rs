@@ -14,7 +14,7 @@ use crate::influence;
 use crate::journal::Journal;
 use crate::reach::Reach;
 use crate::solve::{Config, Progress};
-use crate::solver::{self, Convergence, Stakes};
+use crate::solver::{self, Bound, Convergence, Stakes};
 use crate::transport::{Landing, Transport};
 use geometry::math::offset_origin;
 use geometry::sampling::Lattice2;
@@ -31,6 +31,8 @@ const ROUGH: f32 = 0.15;
 const STANDS_OUT: f32 = 4.0;
 /// A round for fewer new sites than one in so many is not worth its while.
 const HARDLY: usize = 20;
+/// Times as many sites as before for which it is worked out anew what the light hangs on.
+const GROWN: f32 = 1.5;
 /// Rays that probe the middle of a leaf.
 const PROBE: u32 = 32;
 /// A gather ray starts this share of the way from its vertex into a facet: a vertex in the corner of a room lies on
@@ -69,6 +71,10 @@ pub(crate) struct Refiner<'a> {
     pub(crate) h_min: f32,
     /// Reach of a site in finely tessellated surface, m.
     pub(crate) radius: f32,
+    /// What a residual brings at all later bounces, in units of itself, as found on the first mesh; 0 before.
+    gain: f32,
+    /// Sites there were when [`Refiner::influence`] was worked out.
+    influential: usize,
 }
 
 /// What solving on the present mesh gave.
@@ -80,8 +86,8 @@ pub(crate) struct Solved {
     /// Estimated variance of each (mean of the channels), lx².
     pub(crate) variance: Vec<f32>,
     pub(crate) convergence: Convergence,
-    /// ‖K‖∞.
-    pub(crate) norm: f32,
+    /// What a residual brings at all later bounces, in units of itself.
+    pub(crate) gain: f32,
 }
 
 /// A vertex gathered to be compared with a prediction.
@@ -136,6 +142,8 @@ impl<'a> Refiner<'a> {
             h0,
             h_min,
             radius,
+            gain: 0.0,
+            influential: 0,
         };
         refiner.weigh();
         let used = refiner.used();
@@ -172,7 +180,7 @@ impl<'a> Refiner<'a> {
 
     /// Tests and refines until the tolerance, the finest edge, the sites, the rounds or the time run out.
     pub(crate) fn refine(&mut self) {
-        self.settle();
+        self.settle(true);
         let mut edges = self.edges_longer_than(self.radius.max(2.0 * self.h_min), |_| true);
         let mut clusters = Clusters::new(self);
         let mut open: Vec<usize> = (0..clusters.members.len()).collect();
@@ -209,7 +217,7 @@ impl<'a> Refiner<'a> {
                 parted: false,
             }));
             self.gather(&tests.iter().map(|t| (t.vertex, t.sides)).collect::<Vec<_>>());
-            self.settle();
+            self.settle(round + 1 < self.config.rounds);
             let values = self.field.spread(&self.e);
             let around =
                 self.levels(self.field.sites.iter().zip(&self.e).map(|(s, e)| (s.vertex, s.side, e.mean())));
@@ -457,32 +465,47 @@ impl<'a> Refiner<'a> {
     }
 
     /// Solves on what there is, roughly: for predictions, not for pictures.
-    pub(crate) fn settle(&mut self) {
+    ///
+    /// - `onward`: whether more sites will be chosen by what is found.
+    fn settle(&mut self, onward: bool) {
         let tolerance = 0.02 * mean(&self.e).mean();
+        let elements = &self.elements;
+        self.field.sites.par_iter_mut().for_each(|site| {
+            site.row.landings.iter_mut().for_each(|landing| landing.settle(elements));
+        });
         let transport = self.transport(&Flags::default());
-        let settled = self.solved(&transport, tolerance, 12, &[], &[], &Flags::default());
-        self.influence = influence::of_slots(self, &transport, &settled.e);
+        let about = (self.gain > 0.0).then_some(self.gain);
+        let settled = self.solved(&transport, tolerance, 12, about, &[], &[], &Flags::default());
+        // Nearly the same before and after a round of few sites, and as dear as the solve itself.
+        if onward && self.field.sites.len() as f32 > GROWN * self.influential as f32 {
+            self.influence = influence::of_slots(self, &transport, &settled.e);
+            self.influential = self.field.sites.len();
+        }
+        self.gain = settled.gain;
         self.e = settled.e;
         self.field.sites.iter_mut().zip(settled.variance).for_each(|(site, v)| site.variance = v);
     }
 
-    /// Solves E = D + K (E + extra) to `tolerance` lx from the present E, in at most `most` steps; also ‖K‖∞.
+    /// Solves E = D + K (E + extra) to `tolerance` lx from the present E, in at most `most` steps.
     ///
+    /// - `about`: what a residual is believed to bring; worked out where it is not given.
     /// - `extra_parts`: the parts of the groups of lights in `extra`; empty as that is.
     pub(crate) fn solved(
         &self,
         transport: &Transport,
         tolerance: f32,
         most: u32,
+        about: Option<f32>,
         extra: &[Rgb],
         extra_parts: &[Vec<Rgb>],
         flags: &Flags,
     ) -> Solved {
-        let norm = transport.norm();
         let reflect = |e: &[Rgb]| transport.reflect(e, &[]);
         let apply = |e: &[Rgb]| transport.apply(e, extra);
         let stakes = self.stakes();
-        let (e, convergence) = solver::solve(self.e.clone(), &stakes, tolerance, most, apply, reflect);
+        let mut bound = about.map_or(Bound::new(&stakes), |gain| Bound::about(&stakes, gain));
+        let (e, convergence) = solver::iterate(self.e.clone(), tolerance, most, &mut bound, apply, reflect);
+        let gain = bound.gain;
         let variance = transport.variance(&e);
         // Each group of lights by itself, on the same rows: E is their sum.
         let settled = !flags.is_empty();
@@ -500,7 +523,7 @@ impl<'a> Refiner<'a> {
                 solver::solve(direct.clone(), &stakes, bound, most, apply, reflect).0
             })
             .collect();
-        Solved { e, parts, variance, convergence, norm }
+        Solved { e, parts, variance, convergence, gain }
     }
 
     /// What an error at each site matters.
@@ -516,7 +539,8 @@ impl<'a> Refiner<'a> {
 
     /// The rows over the present mesh.
     pub(crate) fn transport(&self, flags: &Flags) -> Transport<'_> {
-        let usable = |s: usize| self.field.usable(s);
+        let usable: Vec<bool> = (0..self.field.sources.0.len()).map(|s| self.field.usable(s)).collect();
+        let usable = |s: usize| usable[s];
         let (world, elements) = (self.world, &self.elements);
         Transport::locate(elements, &self.field, |node, side, w| {
             visible_weights(world, elements, flags, usable, node, side, w)

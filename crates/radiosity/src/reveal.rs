@@ -41,7 +41,6 @@ impl Refiner<'_> {
         if !middles.is_empty() {
             self.weigh();
             self.gather(&middles);
-            self.settle();
         }
     }
 
@@ -54,9 +53,7 @@ impl Refiner<'_> {
         let look = |(site, area): (&Site, f64)| {
             let mut found = Vec::new();
             for landing in &site.row.landings {
-                let (triangle, side) = landing.place();
-                let (u, v) = landing.uv();
-                let (leaf, _) = self.elements.locate(triangle, u, v);
+                let (leaf, side, _) = landing.locate(&self.elements);
                 if !known(leaf, side) {
                     found.push((leaf, side, f64::from(landing.weight().mean()) * area));
                 }

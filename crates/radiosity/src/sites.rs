@@ -209,9 +209,7 @@ impl Refiner<'_> {
             }
             let mut got = row.direct;
             for landing in row.landings.iter() {
-                let (triangle, side) = landing.place();
-                let (u, v) = landing.uv();
-                let (node, w) = self.elements.locate(triangle, u, v);
+                let (node, side, w) = landing.locate(&self.elements);
                 let corners = self.elements.nodes[node as usize].vertices;
                 got += landing.weight() * (0..3).map(|i| values[slot(corners[i], side)] * w[i]).sum::<Rgb>();
             }

@@ -152,6 +152,64 @@ fn balance(world: &World, refiner: &Refiner, extra: &[Rgb], direct: &[Rgb]) -> f
     if left > 0.0 { (arrived / left) as f32 } else { 1.0 }
 }
 
+/// A place on one side of a surface, with what the mesh knows of it.
+#[derive(Clone, Copy)]
+pub struct Spot<'a> {
+    solution: &'a Solution,
+    /// Of the corners of its leaf.
+    slots: [usize; 3],
+    /// Its weights among them; all 0 for a triangle without area.
+    place: [f32; 3],
+    /// The same for those that may speak for it; `None` where none may.
+    spoken: Option<[f32; 3]>,
+    /// The leaf is flagged as one that the mesh does not resolve.
+    unresolved: bool,
+}
+
+impl Spot<'_> {
+    /// Indirect irradiance, lx: light that has left at least one diffuse surface.
+    pub fn irradiance(&self) -> Rgb {
+        self.interpolate(&self.solution.values)
+    }
+
+    /// Irradiance straight from the emitters, as the vertices know it, lx: shadows as coarse as the mesh.
+    pub fn direct(&self) -> Rgb {
+        self.interpolate(&self.solution.direct)
+    }
+
+    /// Irradiance by photons, as the vertices know it, lx.
+    pub fn caustic(&self) -> Rgb {
+        if self.solution.caustic_values.is_empty() {
+            return Rgb::BLACK;
+        }
+        self.interpolate(&self.solution.caustic_values)
+    }
+
+    /// How far [`Spot::irradiance`] may be off; infinitely where nothing is known.
+    pub fn doubt(&self) -> Doubt {
+        let Solution { doubts, usable, values, .. } = self.solution;
+        if doubts.is_empty() || self.place == [0.0; 3] {
+            return Doubt::default();
+        }
+        let known = || self.slots.iter().zip(self.place).filter(|(s, _)| usable[**s]);
+        let sum: f32 = known().map(|(_, w)| w).sum();
+        // On a side that no light reaches there is nothing to be known.
+        if sum <= 1e-6 {
+            return Doubt { mesh: if self.unresolved { f32::INFINITY } else { 0.0 }, ray: 0.0 };
+        }
+        let doubt = known().map(|(&s, w)| doubts[s] * w).sum::<Doubt>() * (1.0 / sum);
+        // What a buried corner would have said is anybody's guess, and where it lies shadows are near.
+        let e: f32 = known().map(|(&s, w)| values[s].mean() * w).sum::<f32>() / sum;
+        let buried = self.unresolved && self.slots.iter().any(|&s| !usable[s]);
+        let guess = if buried { (GUESS * e).powi(2) } else { 0.0 };
+        Doubt { mesh: doubt.mesh + guess, ..doubt }
+    }
+
+    fn interpolate(&self, values: &[Rgb]) -> Rgb {
+        self.spoken.map_or(Rgb::BLACK, |w| (0..3).map(|i| values[self.slots[i]] * w[i]).sum())
+    }
+}
+
 impl Solution {
     pub(crate) fn new(
         refiner: Refiner,
@@ -214,64 +272,41 @@ impl Solution {
         }
     }
 
-    /// Indirect irradiance (lx) at barycentric (u, v) of scene triangle `triangle`, on one side: light that has left
-    /// at least one diffuse surface.
+    /// What is known at barycentric (u, v) of scene triangle `triangle`, on one side.
+    pub fn spot(&self, world: &World, triangle: u32, u: f32, v: f32, side: Side) -> Spot<'_> {
+        if self.elements.piece(triangle).is_none() {
+            return Spot { solution: self, slots: [0; 3], place: [0.0; 3], spoken: None, unresolved: false };
+        }
+        let (node, place) = self.elements.locate(triangle, u, v);
+        let usable = |s: usize| self.usable[s];
+        Spot {
+            solution: self,
+            slots: self.elements.nodes[node as usize].vertices.map(|v| slot(v, side)),
+            place,
+            spoken: visible_weights(world, &self.elements, &self.flags, usable, node, side, place),
+            unresolved: self.flags.unresolved(node, side),
+        }
+    }
+
+    /// [`Spot::irradiance`] at barycentric (u, v) of scene triangle `triangle`, on one side.
     pub fn irradiance(&self, world: &World, triangle: u32, u: f32, v: f32, side: Side) -> Rgb {
-        self.interpolate(world, triangle, u, v, side, &self.values)
+        self.spot(world, triangle, u, v, side).irradiance()
     }
 
-    /// Irradiance (lx) straight from the emitters, as the vertices know it: shadows as coarse as the mesh.
+    /// [`Spot::direct`] there.
     pub fn direct(&self, world: &World, triangle: u32, u: f32, v: f32, side: Side) -> Rgb {
-        self.interpolate(world, triangle, u, v, side, &self.direct)
+        self.spot(world, triangle, u, v, side).direct()
     }
 
-    /// Irradiance (lx) by photons, as the vertices know it.
+    /// [`Spot::caustic`] there.
     pub fn caustic(&self, world: &World, triangle: u32, u: f32, v: f32, side: Side) -> Rgb {
-        if self.caustic_values.is_empty() {
-            return Rgb::BLACK;
-        }
-        self.interpolate(world, triangle, u, v, side, &self.caustic_values)
-    }
-
-    /// How far [`Solution::irradiance`] may be off at this place; infinitely where it knows nothing.
-    pub fn doubt(&self, triangle: u32, u: f32, v: f32, side: Side) -> Doubt {
-        if self.doubts.is_empty() || self.elements.piece(triangle).is_none() {
-            return Doubt::default();
-        }
-        let (node, w) = self.elements.locate(triangle, u, v);
-        let slots = self.elements.nodes[node as usize].vertices.map(|v| slot(v, side));
-        let usable = || slots.iter().zip(w).filter(|(s, _)| self.usable[**s]);
-        let sum: f32 = usable().map(|(_, w)| w).sum();
-        // On a side that no light reaches there is nothing to be known.
-        let reached = self.flags.unresolved(node, side);
-        if sum <= 1e-6 {
-            return Doubt { mesh: if reached { f32::INFINITY } else { 0.0 }, ray: 0.0 };
-        }
-        let doubt = usable().map(|(&s, w)| self.doubts[s] * w).sum::<Doubt>() * (1.0 / sum);
-        // What a buried corner would have said is anybody's guess, and where it lies shadows are near.
-        let e: f32 = usable().map(|(&s, w)| self.values[s].mean() * w).sum::<f32>() / sum;
-        let buried = reached && slots.iter().any(|&s| !self.usable[s]);
-        let guess = if buried { (GUESS * e).powi(2) } else { 0.0 };
-        Doubt { mesh: doubt.mesh + guess, ..doubt }
+        self.spot(world, triangle, u, v, side).caustic()
     }
 
     /// Whether the mesh does not resolve the light at this place, and the one who asks should gather for itself.
     pub fn unresolved(&self, triangle: u32, u: f32, v: f32, side: Side) -> bool {
         let (node, _) = self.elements.locate(triangle, u, v);
         self.flags.unresolved(node, side)
-    }
-
-    fn interpolate(&self, world: &World, triangle: u32, u: f32, v: f32, side: Side, values: &[Rgb]) -> Rgb {
-        if self.elements.piece(triangle).is_none() {
-            return Rgb::BLACK;
-        }
-        let (node, w) = self.elements.locate(triangle, u, v);
-        let corners = self.elements.nodes[node as usize].vertices;
-        let usable = |s: usize| self.usable[s];
-        let Some(w) = visible_weights(world, &self.elements, &self.flags, usable, node, side, w) else {
-            return Rgb::BLACK;
-        };
-        (0..3).map(|i| values[slot(corners[i], side)] * w[i]).sum()
     }
 
     /// The element mesh.

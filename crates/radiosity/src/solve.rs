@@ -175,8 +175,10 @@ pub fn solve_resumable(
     progress.stage("solving", 1);
     let flags = refiner.flags();
     let tolerance = config.solve_tolerance * mean(&refiner.e).mean();
-    let Solved { e, parts, variance, convergence, norm } =
-        refiner.solved(&refiner.transport(&flags), tolerance, 500, &extra, &extra_parts, &flags);
+    let transport = refiner.transport(&flags);
+    let norm = transport.norm();
+    let Solved { e, parts, variance, convergence, .. } =
+        refiner.solved(&transport, tolerance, 500, None, &extra, &extra_parts, &flags);
     if !e.iter().all(|e| e.is_finite()) {
         return Err(Error::Diverged { iterations: convergence.iterations, norm });
     }

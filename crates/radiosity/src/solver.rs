@@ -53,9 +53,20 @@ pub fn solve(
     apply: impl Fn(&[Rgb]) -> Vec<Rgb>,
     reflect: impl Fn(&[Rgb]) -> Vec<Rgb>,
 ) -> (Vec<Rgb>, Convergence) {
+    iterate(start, tolerance, most, &mut Bound::new(stakes), apply, reflect)
+}
+
+/// The same by a `bound` that may be known from a coarser mesh of the same room.
+pub(crate) fn iterate(
+    start: Vec<Rgb>,
+    tolerance: f32,
+    most: u32,
+    bound: &mut Bound,
+    apply: impl Fn(&[Rgb]) -> Vec<Rgb>,
+    reflect: impl Fn(&[Rgb]) -> Vec<Rgb>,
+) -> (Vec<Rgb>, Convergence) {
     let mut x = start;
     let mut report = Convergence::default();
-    let mut bound = Bound::new(stakes);
     let (mut dg, mut df): (Vec<Vec<Rgb>>, Vec<Vec<Rgb>>) = (Vec::new(), Vec::new());
     let mut previous: Option<(Vec<Rgb>, Vec<Rgb>)> = None; // g(x) and f = g(x) − x of the last step
     loop {
@@ -92,21 +103,31 @@ pub fn solve(
 }
 
 /// [`outstanding`], worked out only where the last one gives reason to hope that it is small enough.
-struct Bound<'a> {
+///
+/// That takes as long as several iterations: what is needed for predictions only may believe the gain of a coarser mesh.
+pub(crate) struct Bound<'a> {
     stakes: &'a Stakes,
     /// What a residual brings in all, by the last that was worked out: itself at least.
-    gain: f32,
+    pub(crate) gain: f32,
+    /// Whether that is to be worked out for the residual at hand.
+    exact: bool,
 }
 
 impl<'a> Bound<'a> {
-    fn new(stakes: &'a Stakes) -> Bound<'a> {
-        Bound { stakes, gain: 1.0 }
+    /// A bound that holds.
+    pub(crate) fn new(stakes: &'a Stakes) -> Bound<'a> {
+        Bound { stakes, gain: 1.0, exact: true }
+    }
+
+    /// About the bound, by the `gain` that was found for another residual.
+    pub(crate) fn about(stakes: &'a Stakes, gain: f32) -> Bound<'a> {
+        Bound { stakes, gain, exact: false }
     }
 
     /// The bound of values `x` with the residual `f`; a guess where that is more than `wanted` (lx).
     fn of(&mut self, f: &[Rgb], x: &[Rgb], wanted: f32, reflect: impl Fn(&[Rgb]) -> Vec<Rgb>) -> f32 {
         let left = self.stakes.weighed(f, x);
-        if left * self.gain <= wanted && left > 0.0 {
+        if self.exact && left * self.gain <= wanted && left > 0.0 {
             let bound = outstanding(f, x, self.stakes, reflect);
             // After one that is infinite there may be others that are not.
             self.gain = (bound / left).min(1000.0);

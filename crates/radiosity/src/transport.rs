@@ -16,9 +16,9 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 /// Where one gather ray ended, 16 bytes.
 #[derive(Clone, Copy, Debug)]
 pub struct Landing {
-    /// Scene triangle; the top bit is set for its back.
-    pub(crate) triangle: u32,
-    /// Barycentrics in units of 1/65535.
+    /// Scene triangle or smaller node of the element mesh; the top bit is set for its back.
+    pub(crate) node: u32,
+    /// Barycentrics there in units of 1/65535.
     pub(crate) uv: [u16; 2],
     /// Reflectance met, times what mirrors and glass on the way left, over the number of rays.
     pub(crate) weight: [f16; 3],
@@ -27,30 +27,44 @@ pub struct Landing {
 const BACK: u32 = 1 << 31;
 
 impl Landing {
-    /// Packs a landing.
-    pub fn new(triangle: u32, side: Side, u: f32, v: f32, weight: Rgb) -> Landing {
-        let fix = |x: f32| (x.clamp(0.0, 1.0) * 65535.0) as u16;
+    /// Packs a landing on `node`: a scene triangle, or what refinement made of one.
+    pub fn new(node: u32, side: Side, u: f32, v: f32, weight: Rgb) -> Landing {
         Landing {
-            triangle: triangle | if side == Side::Back { BACK } else { 0 },
-            uv: [fix(u), fix(v)],
+            node: node | if side == Side::Back { BACK } else { 0 },
+            uv: [u, v].map(fixed),
             weight: weight.to_array().map(f16::from_f32),
         }
     }
 
-    /// Scene triangle and side.
-    pub fn place(&self) -> (u32, Side) {
-        (self.triangle & !BACK, if self.triangle & BACK == 0 { Side::Front } else { Side::Back })
+    /// The side that was met.
+    fn side(&self) -> Side {
+        if self.node & BACK == 0 { Side::Front } else { Side::Back }
     }
 
-    /// Barycentrics on the scene triangle.
-    pub fn uv(&self) -> (f32, f32) {
-        (f32::from(self.uv[0]) / 65535.0, f32::from(self.uv[1]) / 65535.0)
+    /// The leaf that it lies in, the side, and the weights of the leaf's corners.
+    pub fn locate(&self, elements: &Elements) -> (u32, Side, [f32; 3]) {
+        let [u, v] = self.uv.map(|x| f32::from(x) / 65535.0);
+        let (leaf, weights) = elements.locate(self.node & !BACK, u, v);
+        (leaf, self.side(), weights)
+    }
+
+    /// Says where it is by the leaf that it lies in: found at once, until that is split.
+    pub fn settle(&mut self, elements: &Elements) {
+        if !elements.nodes[(self.node & !BACK) as usize].is_leaf() {
+            let (leaf, _, [_, u, v]) = self.locate(elements);
+            (self.node, self.uv) = (leaf | (self.node & BACK), [u, v].map(fixed));
+        }
     }
 
     /// The weight.
     pub fn weight(&self) -> Rgb {
         Rgb::from(self.weight.map(f32::from))
     }
+}
+
+/// Of [0, 1] in units of 1/65535, rounded down so that barycentrics still sum to 1 at most.
+fn fixed(x: f32) -> u16 {
+    (x.clamp(0.0, 1.0) * 65535.0) as u16
 }
 
 /// What one site gathered.
@@ -140,9 +154,7 @@ impl<'a> Transport<'a> {
             let mut places = Vec::with_capacity(site.row.landings.len());
             let mut brought = Vec::with_capacity(site.row.landings.len());
             for landing in &site.row.landings {
-                let (triangle, side) = landing.place();
-                let (u, v) = landing.uv();
-                let (node, w) = elements.locate(triangle, u, v);
+                let (node, side, w) = landing.locate(elements);
                 let weight = landing.weight();
                 let Some(w) = weights(node, side, w).filter(|w| w.iter().any(|&w| w > 0.0)) else {
                     unknown += weight;

@@ -19,6 +19,9 @@ const EDGE_POWER: f32 = 1.5;
 /// A redone pixel gets so many times the samples at most: an estimate from few samples may be far off.
 const LEAP: u32 = 16;
 
+/// Pixels whose noise is summed in order: the same sum whatever the number of threads.
+const CHUNK: usize = 4096;
+
 /// So near the goal another round is not worth its while.
 const NEAR: f32 = 1.05;
 
@@ -44,37 +47,43 @@ pub struct Budget {
 
 /// One kind of samples in one pixel.
 struct Stock {
-    /// Relative variance of one sample.
+    /// Relative variance of one sample; that of n of them is v n^-power.
     v: f32,
-    /// The variance of n of them is v n^-power.
     power: f32,
     /// Samples so far.
     n: u32,
     most: u32,
-    cost: f32,
+    /// Logarithm to base four of the samples at which one more removes as much of the picture's variance as it costs,
+    /// and a number in [0, 1) by which it is rounded.
+    rung: f32,
 }
 
 impl Stock {
-    /// Samples at which one more of them removes `worth` of the picture's variance.
-    fn optimum(&self, worth: f32) -> f32 {
+    /// - `luck`: in [0, 1): which of the powers of four above and below the optimum it is to be.
+    fn new(v: f32, power: f32, n: u32, most: u32, cost: f32, luck: f32) -> Stock {
+        let optimum = (power * v / cost).log(4.0) / (1.0 + power);
+        Stock { v, power, n, most: most.max(n), rung: optimum + luck }
+    }
+
+    /// The rung of the ladder (powers of four) at which one more sample removes about `4^worth` of the picture's variance
+    /// for each unit of cost; no less than there is.
+    fn at(&self, worth: f32) -> u32 {
         if self.v <= 0.0 {
-            return self.n as f32; // nothing over nothing where `worth` is 0 as well
+            return self.n; // nothing over nothing
         }
-        let n = (self.power * self.v / (self.cost * worth)).powf(1.0 / (1.0 + self.power));
-        n.clamp(self.n as f32, self.most as f32)
+        let k = (self.rung - worth / (1.0 + self.power)).clamp(0.0, 15.0) as u32;
+        4u32.pow(k).clamp(self.n, self.most)
     }
 
-    /// Variance left at the optimum.
+    /// Variance left there.
     fn left(&self, worth: f32) -> f64 {
-        f64::from(self.v * self.optimum(worth).powf(-self.power))
+        let n = self.at(worth) as f32;
+        f64::from(self.v / if self.power == 1.0 { n } else { n.powf(self.power) })
     }
 
-    /// The rung of the ladder (powers of four) below that or above, by `luck` in [0, 1) and how near they are; within
-    /// a leap of what there is.
-    fn next(&self, worth: f32, luck: f32) -> u32 {
-        let wanted = self.optimum(worth).min((self.n * LEAP) as f32).max(1.0);
-        let rung = 4u32.pow((wanted.log(4.0) + luck).floor() as u32);
-        rung.clamp(self.n, self.most.max(self.n))
+    /// The samples to take next: those, but within a leap of what there is.
+    fn next(&self, worth: f32) -> u32 {
+        self.at(worth).min(self.n * LEAP)
     }
 }
 
@@ -114,9 +123,11 @@ pub fn next(shots: &[Option<Shot>], noise: &[Noise], budget: &Budget) -> Vec<(u3
     let stock = |i: usize| {
         shots[i].as_ref().map(|shot| {
             let Effort { camera, shadow } = shot.effort;
+            // The same for a pixel in every round, lest a few more get their turn each time.
+            let luck = Rng::new(0x6c75_636b, i as u64).f32();
             let stock = |variance: f32, n: u32, most: u32, power: f32, cost: f32| {
                 let v = (variance * weights[i] * (n as f32).powf(power)).min(1e30);
-                Stock { v, power, n, most: most.max(n), cost }
+                Stock::new(v, power, n, most, cost, luck)
             };
             let (power, cost) = if shot.specular { (1.0, SPECULAR_COST) } else { (EDGE_POWER, 1.0) };
             [
@@ -126,39 +137,35 @@ pub fn next(shots: &[Option<Shot>], noise: &[Noise], budget: &Budget) -> Vec<(u3
         })
     };
     let stocks: Vec<Option<[Stock; 2]>> = (0..shots.len()).into_par_iter().map(stock).collect();
+    // The worth of a sample at which the picture just meets the goal, by bisection of its logarithm. What pixels leave
+    // that can have no more is not made up for by the others.
     let left = |worth: f32| -> f64 {
-        stocks.par_iter().flatten().map(|s| s[0].left(worth) + s[1].left(worth)).sum::<f64>()
+        let of = |s: &Option<[Stock; 2]>| s.as_ref().map_or(0.0, |[a, b]| a.left(worth) + b.left(worth));
+        stocks
+            .par_chunks(CHUNK)
+            .map(|chunk| chunk.iter().map(of).sum::<f64>())
+            .collect::<Vec<_>>()
+            .iter()
+            .sum()
     };
-    // The worth of a sample at which the optimum just meets the goal, by bisection of its logarithm. What pixels leave
-    // that can have no more is not made up for by the others. Where no rung is near enough to the optimum to be taken,
-    // a little more is asked.
-    let least = left(0.0);
-    for tighter in [1.0, 0.8, 0.6] {
-        let goal = (f64::from(tighter * budget.goal).powi(2) * shots.len() as f64).max(2.0 * least);
-        let (mut low, mut high) = (-60f32, 60f32);
-        for _ in 0..24 {
-            let middle = 0.5 * (low + high);
-            if left(middle.exp2()) > goal { high = middle } else { low = middle }
-        }
-        let worth = low.exp2();
-        let more = |(i, stock): (usize, &Option<[Stock; 2]>)| {
-            let [camera, light] = stock.as_ref()?;
-            // The same for a pixel in every round, lest a few more get their turn each time.
-            let luck = Rng::new(0x6c75_636b, i as u64).f32();
-            let mut effort = Effort { camera: camera.next(worth, luck), shadow: light.next(worth, luck) };
-            if camera.cost == 1.0 {
-                // The edge of a shadow runs through the pixel as an edge of a surface does: shadow rays start from
-                // several points of it.
-                effort.camera = effort.camera.max(effort.shadow / 4).min(camera.most);
-            }
-            (effort.camera > camera.n || effort.shadow > light.n).then_some((i as u32, effort))
-        };
-        let wanted: Vec<(u32, Effort)> = stocks.par_iter().enumerate().filter_map(more).collect();
-        if wanted.len() * FEW > shots.len() {
-            return wanted;
-        }
+    let (mut low, mut high) = (-50f32, 50f32);
+    let goal = (f64::from(budget.goal).powi(2) * shots.len() as f64).max(2.0 * left(low));
+    for _ in 0..24 {
+        let middle = 0.5 * (low + high);
+        if left(middle) > goal { high = middle } else { low = middle }
     }
-    Vec::new()
+    let more = |(i, stock): (usize, &Option<[Stock; 2]>)| {
+        let [camera, light] = stock.as_ref()?;
+        let mut effort = Effort { camera: camera.next(low), shadow: light.next(low) };
+        if !shots[i].as_ref()?.specular {
+            // The edge of a shadow runs through the pixel as an edge of a surface does: shadow rays start from
+            // several points of it.
+            effort.camera = effort.camera.max(effort.shadow / 4).min(camera.most);
+        }
+        (effort.camera > camera.n || effort.shadow > light.n).then_some((i as u32, effort))
+    };
+    let wanted: Vec<(u32, Effort)> = stocks.par_iter().enumerate().filter_map(more).collect();
+    if wanted.len() * FEW > shots.len() { wanted } else { Vec::new() }
 }
 
 /// The pixels among their neighbours.
@@ -284,32 +291,37 @@ mod tests {
     use crate::film::Pixel;
     use geometry::{Camera, Rgb, Vec3};
 
-    fn stock(v: f32, power: f32, cost: f32) -> Stock {
-        Stock { v, power, n: 1, most: 1 << 14, cost }
+    const LUCKS: u32 = 1000;
+
+    /// Mean logarithm of the samples taken at `worth`, over all lucks.
+    fn mean_log(v: f32, power: f32, cost: f32, worth: f32) -> f32 {
+        let at = |k: u32| Stock::new(v, power, 1, 1 << 14, cost, k as f32 / LUCKS as f32).at(worth);
+        (0..LUCKS).map(|k| (at(k) as f32).ln()).sum::<f32>() / LUCKS as f32
     }
 
     #[test]
     fn the_optimum_gives_every_pixel_samples_of_equal_worth() {
         // Of one more sample: power · v · n^-(power + 1) / cost.
-        for s in [stock(4.0, 1.0, 1.0), stock(1.0, 1.0, 1.0), stock(9.0, 1.5, 1.0), stock(2.0, 1.0, 8.0)] {
-            let n = s.optimum(1e-3);
-            let worth = s.power * s.v * n.powf(-1.0 - s.power) / s.cost;
-            assert!((worth / 1e-3 - 1.0).abs() < 1e-3, "{n} samples: {worth}");
+        for (v, power, cost) in [(4.0, 1.0, 1.0), (1.0, 1.0, 1.0), (9.0, 1.5, 1.0), (2.0, 1.0, 8.0f32)] {
+            let n = mean_log(v, power, cost, -5.0).exp();
+            let worth = power * v / cost * n.powf(-1.0 - power);
+            assert!((worth * 4f32.powi(5) - 1.0).abs() < 0.01, "{n} samples: {worth}");
         }
         // Four times the variance, twice the samples.
-        let ratio = stock(4.0, 1.0, 1.0).optimum(1e-3) / stock(1.0, 1.0, 1.0).optimum(1e-3);
-        assert!((ratio - 2.0).abs() < 1e-3, "{ratio}");
+        let ratio = (mean_log(4.0, 1.0, 1.0, -5.0) - mean_log(1.0, 1.0, 1.0, -5.0)).exp();
+        assert!((ratio - 2.0).abs() < 0.01, "{ratio}");
     }
 
     #[test]
     fn rungs_are_powers_of_four_within_a_leap() {
-        let s = Stock { n: 4, most: 256, ..stock(1e9, 1.0, 1.0) };
-        assert_eq!((s.next(1e-6, 0.0), s.next(1e-6, 0.99)), (64, 64), "16 times 4");
-        assert_eq!(Stock { n: 64, ..s }.next(1e-6, 0.0), 256, "no more than allowed");
-        assert_eq!(stock(1e-9, 1.0, 1.0).next(1.0, 0.99), 1, "no less than there is");
+        let s = |n: u32, luck: f32| Stock::new(1e9, 1.0, n, 256, 1.0, luck);
+        assert_eq!((s(4, 0.0).next(-10.0), s(4, 0.99).next(-10.0)), (64, 64), "16 times 4");
+        assert_eq!(s(64, 0.0).next(-10.0), 256, "no more than allowed");
+        let none = |v: f32| Stock::new(v, 1.0, 1, 256, 1.0, 0.99).next(0.0);
+        assert_eq!((none(1e-9), none(0.0)), (1, 1), "no less than there is");
         // An optimum of 8 is as likely 4 as 16.
-        let eight = stock(64.0, 1.0, 1.0);
-        assert_eq!((eight.next(1.0, 0.49), eight.next(1.0, 0.51)), (4, 16));
+        let eight = |luck: f32| Stock::new(64.0, 1.0, 1, 256, 1.0, luck).next(0.0);
+        assert_eq!((eight(0.49), eight(0.51)), (4, 16));
     }
 
     /// A picture of one surface whose direct light is `lit(x, y)`, 64 × 64.

@@ -39,9 +39,20 @@ impl Grid {
         cell.iter().fold(0, |key, &c| (key << 21) | u64::from(c as u32 & 0x1f_ffff))
     }
 
+    /// The cell that a place lies in.
+    pub fn cell(&self, p: Vec3) -> u64 {
+        Self::key(self.cell_of(p))
+    }
+
+    /// The cells in which places within distance 1 of `p` lie.
+    pub fn cells_around(&self, p: Vec3) -> impl Iterator<Item = u64> {
+        let [x, y, z] = self.cell_of(p);
+        (0..27).map(move |i| Self::key([x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1]))
+    }
+
     /// Adds a vertex.
     pub fn insert(&mut self, vertices: &[Vertex], v: VertexId) {
-        self.cells.entry(Self::key(self.cell_of(vertices[v as usize].position))).or_default().push(v);
+        self.cells.entry(self.cell(vertices[v as usize].position)).or_default().push(v);
     }
 
     /// Every vertex within distance 1 of `at`, with that distance squared.
@@ -50,10 +61,8 @@ impl Grid {
         vertices: &'a [Vertex],
         at: &'a Vertex,
     ) -> impl Iterator<Item = (VertexId, f32)> + 'a {
-        let [x, y, z] = self.cell_of(at.position);
-        (0..27).flat_map(move |i| {
-            let cell = [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1];
-            let found = self.cells.get(&Self::key(cell)).map_or(&[][..], Vec::as_slice);
+        self.cells_around(at.position).flat_map(move |cell| {
+            let found = self.cells.get(&cell).map_or(&[][..], Vec::as_slice);
             found.iter().filter_map(move |&v| {
                 let d2 = distance2(at, &vertices[v as usize], self.cell);
                 (d2 < 1.0).then_some((v, d2))

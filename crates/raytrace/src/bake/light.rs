@@ -193,9 +193,8 @@ fn hit(Place { triangle, uv: [u, v], .. }: Place) -> Hit {
 pub fn roughly(world: &World, solution: &Solution, place: Place) -> Seen {
     let Place { triangle, uv: [u, v], side } = place;
     let (base, alpha) = base_color_at(&world.scene, &hit(place));
-    let e = solution.irradiance(world, triangle, u, v, side)
-        + solution.direct(world, triangle, u, v, side)
-        + solution.caustic(world, triangle, u, v, side);
+    let spot = solution.spot(world, triangle, u, v, side);
+    let e = spot.irradiance() + spot.direct() + spot.caustic();
     let white = reflected_radiance(Rgb::WHITE, e);
     let emission = surface_at(world, place).emission;
     Seen { white, emission, base, alpha, hidden: false, variance: 0.0 }

@@ -170,15 +170,15 @@ impl Hybrid<'_> {
         }
         let side = Side::met(surface.front);
         let (t, u, v) = (surface.triangle, surface.u, surface.v);
+        let spot = self.solution.spot(self.world, t, u, v, side);
         let albedo = surface.bsdf.diffuse_albedo(wo);
         if from_vertices {
-            let e = self.solution.direct(self.world, t, u, v, side);
+            let e = spot.direct();
             out.direct = photometry::reflected_radiance(albedo, e);
             (out.irradiance, out.straight) = (e, Rgb::BLACK);
             out.variance = 0.0;
         }
-        let mut e = self.solution.irradiance(self.world, t, u, v, side);
-        let doubt = self.solution.doubt(t, u, v, side);
+        let (mut e, doubt) = (spot.irradiance(), spot.doubt());
         let light = e.mean() + out.straight.mean();
         out.gathered = match (self.mode, quality.gather) {
             (DiffuseMode::Vertex, _) | (_, Gather::Never) => None,
@@ -199,7 +199,7 @@ impl Hybrid<'_> {
         }
         // Only what the eye sees directly, or nearly so, needs a caustic's own sharpness; in a mirror only where the
         // vertices know of one.
-        let blurred = self.solution.caustic(self.world, t, u, v, side);
+        let blurred = spot.caustic();
         let sharp = match quality.photons {
             Photons::Always => true,
             Photons::WhereTheyMatter => blurred.luminance() > HARDLY * e.luminance(),
@@ -246,9 +246,8 @@ impl Hybrid<'_> {
             let ray = Ray::new(offset_origin(surface.position, surface.ng), wi);
             let mut reflected = Rgb::BLACK;
             let land = |hit: &Hit, side, weight| {
-                let e = self.solution.irradiance(self.world, hit.triangle, hit.u, hit.v, side)
-                    + self.solution.caustic(self.world, hit.triangle, hit.u, hit.v, side);
-                reflected += weight * e;
+                let spot = self.solution.spot(self.world, hit.triangle, hit.u, hit.v, side);
+                reflected += weight * (spot.irradiance() + spot.caustic());
             };
             let followed = gather::follow(self.world, ray, rng, land, |_, _| ());
             let brought = followed.direct + reflected;
