@@ -14,8 +14,9 @@ use geometry::{LightGroups, Mesh, Passage, Ray, Rgb, Vec3, World};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Photons that one estimate of irradiance uses.
-const NEAREST: usize = 80;
+/// Photons that one estimate of irradiance uses: with 80 the shadow of a shelf under a table of glass is blurred, and the
+/// gallery's picture at 5 % is off by 1 % more.
+const NEAREST: usize = 40;
 /// Particles in one batch; the batch number seeds it, whatever thread runs it.
 const BATCH: usize = 4096;
 /// Batches of the pilot.

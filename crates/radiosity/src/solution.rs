@@ -156,7 +156,9 @@ fn balance(world: &World, refiner: &Refiner, extra: &[Rgb], direct: &[Rgb]) -> f
 #[derive(Clone, Copy)]
 pub struct Spot<'a> {
     solution: &'a Solution,
-    /// Of the corners of its leaf.
+    /// Its leaf.
+    node: u32,
+    /// Of the corners of that.
     slots: [usize; 3],
     /// Its weights among them; all 0 for a triangle without area.
     place: [f32; 3],
@@ -203,6 +205,15 @@ impl Spot<'_> {
         let buried = self.unresolved && self.slots.iter().any(|&s| !usable[s]);
         let guess = if buried { (GUESS * e).powi(2) } else { 0.0 };
         Doubt { mesh: doubt.mesh + guess, ..doubt }
+    }
+
+    /// Longest edge of the leaf, m: what is said of it changes little within that.
+    pub fn extent(&self) -> f32 {
+        if self.place == [0.0; 3] {
+            return 0.0;
+        }
+        let [a, b, c] = self.solution.elements.corners(self.node);
+        a.distance(b).max(b.distance(c)).max(c.distance(a))
     }
 
     fn interpolate(&self, values: &[Rgb]) -> Rgb {
@@ -275,12 +286,14 @@ impl Solution {
     /// What is known at barycentric (u, v) of scene triangle `triangle`, on one side.
     pub fn spot(&self, world: &World, triangle: u32, u: f32, v: f32, side: Side) -> Spot<'_> {
         if self.elements.piece(triangle).is_none() {
-            return Spot { solution: self, slots: [0; 3], place: [0.0; 3], spoken: None, unresolved: false };
+            let (node, slots) = (triangle, [0; 3]);
+            return Spot { solution: self, node, slots, place: [0.0; 3], spoken: None, unresolved: false };
         }
         let (node, place) = self.elements.locate(triangle, u, v);
         let usable = |s: usize| self.usable[s];
         Spot {
             solution: self,
+            node,
             slots: self.elements.nodes[node as usize].vertices.map(|v| slot(v, side)),
             place,
             spoken: visible_weights(world, &self.elements, &self.flags, usable, node, side, place),
