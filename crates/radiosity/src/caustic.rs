@@ -14,9 +14,11 @@ use geometry::{LightGroups, Mesh, Passage, Ray, Rgb, Vec3, World};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Photons that one estimate of irradiance uses: with 80 the shadow of a shelf under a table of glass is blurred, and the
-/// gallery's picture at 5 % is off by 1 % more.
-const NEAREST: usize = 40;
+/// Photons that one estimate of irradiance uses, of so many in all; of more more, for then their noise is what is left.
+/// With 80 of 25 000 the shadow of a shelf under a table of glass is blurred, and the gallery's picture at 5 % is off by 1 %
+/// more.
+const NEAREST: f32 = 40.0;
+const OF: f32 = 25_000.0;
 /// Particles in one batch; the batch number seeds it, whatever thread runs it.
 const BATCH: usize = 4096;
 /// Batches of the pilot.
@@ -38,6 +40,12 @@ fn reach(world: &World, photons: usize) -> f32 {
     let area: f32 = (0..mesh.triangles.len() as u32).map(|t| mesh.area(t)).sum();
     let ten = (10.0 * area / (std::f32::consts::PI * photons.max(1) as f32)).sqrt();
     ten.clamp(0.1 * world.scale, world.scale)
+}
+
+/// Photons that an estimate uses, of `all`: between what keeps the noise as it is and what is best of noise and blur
+/// together, all^(2/3).
+fn nearest(all: usize) -> usize {
+    (NEAREST * (all as f32 / OF).cbrt()).clamp(NEAREST, 4.0 * NEAREST) as usize
 }
 
 /// A particle where it landed.
@@ -64,6 +72,8 @@ pub struct Caustics {
     axes: Vec<u8>,
     /// No estimate reaches further than this, m.
     reach: f32,
+    /// Nor uses more photons.
+    nearest: usize,
     /// Particles sent.
     pub sent: usize,
 }
@@ -121,7 +131,8 @@ impl Caustics {
         let mut axes = vec![0; photons.len()];
         balance(&mut photons, &mut axes);
         let reach = reach(world, photons.len());
-        Caustics { photons, axes, reach, sent: last * BATCH }
+        let nearest = nearest(photons.len());
+        Caustics { photons, axes, reach, nearest, sent: last * BATCH }
     }
 
     /// Number of photons kept.
@@ -145,7 +156,7 @@ impl Caustics {
         if self.photons.is_empty() {
             return Rgb::BLACK;
         }
-        let mut nearest: Vec<(f32, u32)> = Vec::with_capacity(NEAREST + 1);
+        let mut nearest: Vec<(f32, u32)> = Vec::with_capacity(self.nearest + 1);
         let mut bound = self.reach * self.reach;
         self.search(0, self.photons.len(), p, n, &mut nearest, &mut bound);
         let r2 = bound.max(1e-12);
@@ -168,10 +179,10 @@ impl Caustics {
         let d2 = p.distance_squared(photon.position);
         if d2 < *bound && photon.normal.dot(n) > 0.7 {
             push_heap(nearest, (d2, mid as u32));
-            if nearest.len() > NEAREST {
+            if nearest.len() > self.nearest {
                 pop_heap(nearest);
             }
-            if nearest.len() == NEAREST {
+            if nearest.len() == self.nearest {
                 *bound = nearest[0].0;
             }
         }
@@ -287,8 +298,9 @@ impl Caustics {
             let normal = mesh.geometric_normal(triangle) * side.sign();
             Photon { position, normal, flux, triangle, uv, side, group }
         };
-        let photons = kept.par_iter().map(photon).collect();
-        Some(Caustics { photons, axes: kept.iter().map(|k| k.axis).collect(), reach, sent })
+        let photons: Vec<Photon> = kept.par_iter().map(photon).collect();
+        let nearest = nearest(photons.len());
+        Some(Caustics { photons, axes: kept.iter().map(|k| k.axis).collect(), reach, nearest, sent })
     }
 }
 
@@ -447,7 +459,7 @@ mod tests {
             .collect();
         let mut axes = vec![0; n];
         balance(&mut photons, &mut axes);
-        let map = Caustics { photons, axes, reach: 1.0, sent: n };
+        let map = Caustics { photons, axes, reach: 1.0, nearest: 80, sent: n };
         // The kernel's effective number of photons is 3/4 of NEAREST: one estimate's sigma is 13 %, the mean of 64 has 1.6 %;
         // dividing by the distance to the k-th photon biases by 1/k.
         let mean: f32 = (0..64)

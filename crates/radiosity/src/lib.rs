@@ -47,6 +47,7 @@ pub mod patches;
 pub mod reach;
 pub mod refine;
 mod reveal;
+mod settle;
 mod sites;
 mod smooth;
 pub mod solution;

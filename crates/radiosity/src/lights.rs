@@ -158,7 +158,7 @@ impl Solution {
         };
         let caustics = self.caustics.scaled(factors);
         let report = Report {
-            mean: crate::refine::mean(&at_sites.indirect),
+            mean: crate::settle::mean(&at_sites.indirect),
             caustic_flux: caustics.flux(),
             ..self.report.clone()
         };
@@ -170,7 +170,7 @@ impl Solution {
         let means = self
             .at_sites
             .as_ref()
-            .map(|s| [&s.direct, &s.indirect].map(|e| crate::refine::mean(e).luminance()));
+            .map(|s| [&s.direct, &s.indirect].map(|e| crate::settle::mean(e).luminance()));
         means.map_or(0.0, |[direct, indirect]| direct + indirect)
     }
 

@@ -8,14 +8,13 @@ use crate::element::cluster;
 use crate::element::{EdgeMarks, Elements, Side, VertexId, slot};
 use crate::field::Field;
 use crate::first_mesh::first_mesh;
-use crate::flags::{Flags, visible_weights};
+use crate::flags::Flags;
 use crate::importance::Importance;
-use crate::influence;
 use crate::journal::Journal;
 use crate::reach::Reach;
+use crate::settle::mean;
 use crate::solve::{Config, Progress};
-use crate::solver::{self, Bound, Convergence, Stakes};
-use crate::transport::{Landing, Transport};
+use crate::transport::Landing;
 use geometry::math::offset_origin;
 use geometry::sampling::Lattice2;
 use geometry::{LightGroups, Ray, Rgb, World, triangle};
@@ -31,8 +30,6 @@ const ROUGH: f32 = 0.15;
 const STANDS_OUT: f32 = 4.0;
 /// A round for fewer new sites than one in so many is not worth its while.
 const HARDLY: usize = 20;
-/// Times as many sites as before for which it is worked out anew what the light hangs on.
-const GROWN: f32 = 1.5;
 /// Rays that probe the middle of a leaf.
 const PROBE: u32 = 32;
 /// A gather ray starts this share of the way from its vertex into a facet: a vertex in the corner of a room lies on
@@ -64,7 +61,7 @@ pub(crate) struct Refiner<'a> {
     /// What an error matters at each slot, (0, 1]; empty where all matters alike.
     weights: Vec<f32>,
     /// What an error at each slot matters for all the light there is: see [`influence`].
-    influence: Vec<f32>,
+    pub(crate) influence: Vec<f32>,
     /// Longest edge of the first mesh, m.
     h0: f32,
     /// Shortest edge worth splitting to, m.
@@ -72,22 +69,9 @@ pub(crate) struct Refiner<'a> {
     /// Reach of a site in finely tessellated surface, m.
     pub(crate) radius: f32,
     /// What a residual brings at all later bounces, in units of itself, as found on the first mesh; 0 before.
-    gain: f32,
-    /// Sites there were when [`Refiner::influence`] was worked out.
-    influential: usize,
-}
-
-/// What solving on the present mesh gave.
-pub(crate) struct Solved {
-    /// E at the sites, lx.
-    pub(crate) e: Vec<Rgb>,
-    /// The parts of the groups of lights in it, where these are kept apart and the mesh is final.
-    pub(crate) parts: Vec<Vec<Rgb>>,
-    /// Estimated variance of each (mean of the channels), lx².
-    pub(crate) variance: Vec<f32>,
-    pub(crate) convergence: Convergence,
-    /// What a residual brings at all later bounces, in units of itself.
     pub(crate) gain: f32,
+    /// Sites there were when [`Refiner::influence`] was worked out.
+    pub(crate) influential: usize,
 }
 
 /// A vertex gathered to be compared with a prediction.
@@ -464,94 +448,6 @@ impl<'a> Refiner<'a> {
         edges
     }
 
-    /// Solves on what there is, roughly: for predictions, not for pictures.
-    ///
-    /// - `onward`: whether more sites will be chosen by what is found.
-    fn settle(&mut self, onward: bool) {
-        let tolerance = 0.02 * mean(&self.e).mean();
-        let elements = &self.elements;
-        self.field.sites.par_iter_mut().for_each(|site| {
-            site.row.landings.iter_mut().for_each(|landing| landing.settle(elements));
-        });
-        let transport = self.transport(&Flags::default());
-        let about = (self.gain > 0.0).then_some(self.gain);
-        let settled = self.solved(&transport, tolerance, 12, about, &[], &[], &Flags::default());
-        // Nearly the same before and after a round of few sites, and as dear as the solve itself.
-        if onward && self.field.sites.len() as f32 > GROWN * self.influential as f32 {
-            self.influence = influence::of_slots(self, &transport, &settled.e);
-            self.influential = self.field.sites.len();
-        }
-        self.gain = settled.gain;
-        self.e = settled.e;
-        self.field.sites.iter_mut().zip(settled.variance).for_each(|(site, v)| site.variance = v);
-    }
-
-    /// Solves E = D + K (E + extra) to `tolerance` lx from the present E, in at most `most` steps.
-    ///
-    /// - `about`: what a residual is believed to bring; worked out where it is not given.
-    /// - `extra_parts`: the parts of the groups of lights in `extra`; empty as that is.
-    pub(crate) fn solved(
-        &self,
-        transport: &Transport,
-        tolerance: f32,
-        most: u32,
-        about: Option<f32>,
-        extra: &[Rgb],
-        extra_parts: &[Vec<Rgb>],
-        flags: &Flags,
-    ) -> Solved {
-        let reflect = |e: &[Rgb]| transport.reflect(e, &[]);
-        let apply = |e: &[Rgb]| transport.apply(e, extra);
-        let stakes = self.stakes();
-        let mut bound = about.map_or(Bound::new(&stakes), |gain| Bound::about(&stakes, gain));
-        let (e, convergence) = solver::iterate(self.e.clone(), tolerance, most, &mut bound, apply, reflect);
-        let gain = bound.gain;
-        let variance = transport.variance(&e);
-        // Each group of lights by itself, on the same rows: E is their sum.
-        let settled = !flags.is_empty();
-        let groups = if settled { self.groups.as_ref().map_or(0, LightGroups::len) } else { 0 };
-        let parts = (0..groups)
-            .map(|g| {
-                let direct: Vec<Rgb> = self.field.sites.iter().map(|s| s.row.by_group[g]).collect();
-                let bound = tolerance * mean(&direct).mean() / self.mean_direct().max(1e-30);
-                let extra = extra_parts.get(g).map_or(&[][..], |part| part);
-                let apply = |e: &[Rgb]| {
-                    let mut sum = transport.reflect(e, extra);
-                    sum.iter_mut().zip(&direct).for_each(|(sum, &d)| *sum += d);
-                    sum
-                };
-                solver::solve(direct.clone(), &stakes, bound, most, apply, reflect).0
-            })
-            .collect();
-        Solved { e, parts, variance, convergence, gain }
-    }
-
-    /// What an error at each site matters.
-    fn stakes(&self) -> Stakes {
-        let around =
-            self.levels(self.field.sites.iter().zip(&self.e).map(|(s, e)| (s.vertex, s.side, e.mean())));
-        let slots = || self.field.sites.iter().map(|s| slot(s.vertex, s.side));
-        Stakes {
-            weights: slots().map(|s| self.weight(s)).collect(),
-            levels: slots().map(|s| around[self.face_slot(s)]).collect(),
-        }
-    }
-
-    /// The rows over the present mesh.
-    pub(crate) fn transport(&self, flags: &Flags) -> Transport<'_> {
-        let usable: Vec<bool> = (0..self.field.sources.0.len()).map(|s| self.field.usable(s)).collect();
-        let usable = |s: usize| usable[s];
-        let (world, elements) = (self.world, &self.elements);
-        Transport::locate(elements, &self.field, |node, side, w| {
-            visible_weights(world, elements, flags, usable, node, side, w)
-        })
-    }
-
-    /// Mean over sites of what comes back of emitters' light, lx.
-    fn mean_direct(&self) -> f32 {
-        mean(&self.field.sites.iter().map(|s| s.row.direct).collect::<Vec<_>>()).mean()
-    }
-
     /// Where pass 2 should gather for itself.
     pub(crate) fn flags(&self) -> Flags {
         let mut unresolved = vec![false; self.elements.vertices.len()];
@@ -594,12 +490,4 @@ impl<'a> Refiner<'a> {
     pub(crate) fn row_bytes(&self) -> usize {
         self.landings() * size_of::<Landing>()
     }
-}
-
-/// Mean over sites, lx.
-pub(crate) fn mean(e: &[Rgb]) -> Rgb {
-    let sum = e
-        .iter()
-        .fold([0f64; 3], |s, e| [s[0] + f64::from(e.r), s[1] + f64::from(e.g), s[2] + f64::from(e.b)]);
-    Rgb::from(sum.map(|s| (s / e.len().max(1) as f64) as f32))
 }

@@ -68,7 +68,7 @@ pub(crate) fn smoothing(refiner: &Refiner, flags: &Flags, variance: &[f32]) -> S
             near().map(|s| variance[s as usize]).sum::<f32>() / near().count() as f32
         })
         .collect();
-    let level = crate::refine::mean(&refiner.e).mean();
+    let level = crate::settle::mean(&refiner.e).mean();
     let fit = |site| fit(refiner, &refiner.field, &graph, &pooled, level, site);
     Smoothing((0..refiner.e.len() as u32).into_par_iter().map(fit).collect())
 }

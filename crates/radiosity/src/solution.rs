@@ -103,7 +103,7 @@ impl Report {
             row_bytes: refiner.row_bytes(),
             convergence,
             norm,
-            mean: crate::refine::mean(&refiner.e),
+            mean: crate::settle::mean(&refiner.e),
             balance: balance(world, refiner, extra, direct),
             flagged: flags.share(),
             photons: caustics.len(),
