@@ -10,7 +10,7 @@ use geometry::{LightGroups, Rgb};
 use rayon::prelude::*;
 
 /// Times as many sites as before for which it is worked out anew what the light hangs on.
-const GROWN: f32 = 1.5;
+const GROWN: f32 = 1.2;
 
 /// What solving on the present mesh gave.
 pub(crate) struct Solved {
