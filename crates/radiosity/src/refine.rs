@@ -60,7 +60,7 @@ pub(crate) struct Refiner<'a> {
     pub(crate) unresolved: Vec<VertexId>,
     /// What an error matters at each slot, (0, 1]; empty where all matters alike.
     weights: Vec<f32>,
-    /// What an error at each slot matters for all the light there is: see [`influence`].
+    /// What an error at each slot matters for all the light there is: see [`crate::influence`].
     pub(crate) influence: Vec<f32>,
     /// Longest edge of the first mesh, m.
     h0: f32,
