@@ -118,7 +118,7 @@ fn aided_paths_have_the_mean_of_plain_ones() {
     };
     println!("plain {plain}, aided {aided}, of which by the mirror {share}");
     assert!(share > 0.1, "the test would find a tenth of the light: {share}");
-    // One estimate by 80 photons is too large by 1/80, of what the mirror brings.
+    // Of what the mirror brings a fiftieth is left to the estimate by photons.
     let allowed = ALARM * (v + w).sqrt() + 0.02 * share * plain;
     assert!((aided - plain).abs() < allowed && allowed < 0.02 * plain, "{aided}, not {plain}: {allowed}");
 }

@@ -68,8 +68,8 @@ pub(crate) struct Refiner<'a> {
     pub(crate) h_min: f32,
     /// Reach of a site in finely tessellated surface, m.
     pub(crate) radius: f32,
-    /// What a residual brings at all later bounces, in units of itself, as found on the first mesh; 0 before.
-    pub(crate) gain: f32,
+    /// What a residual brings at all later bounces, in units of itself, as found on the first mesh.
+    pub(crate) gain: Option<f32>,
     /// Sites there were when [`Refiner::influence`] was worked out.
     pub(crate) influential: usize,
 }
@@ -126,7 +126,7 @@ impl<'a> Refiner<'a> {
             h0,
             h_min,
             radius,
-            gain: 0.0,
+            gain: None,
             influential: 0,
         };
         refiner.weigh();

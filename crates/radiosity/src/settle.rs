@@ -33,31 +33,30 @@ impl Refiner<'_> {
         let tolerance = 0.02 * mean(&self.e).mean();
         let elements = &self.elements;
         self.field.sites.par_iter_mut().for_each(|site| {
-            site.row.landings.iter_mut().for_each(|landing| landing.settle(elements));
+            site.row.landings.iter_mut().for_each(|landing| landing.go_to_leaf(elements));
         });
         let transport = self.transport(&Flags::default());
-        let about = (self.gain > 0.0).then_some(self.gain);
-        let settled = self.solved(&transport, tolerance, 12, about, &[], &[], &Flags::default());
+        let settled = self.solved(&transport, tolerance, 12, self.gain, &[], &[], &Flags::default());
         // Nearly the same before and after a round of few sites, and as dear as the solve itself.
         if onward && self.field.sites.len() as f32 > GROWN * self.influential as f32 {
             self.influence = influence::of_slots(self, &transport, &settled.e);
             self.influential = self.field.sites.len();
         }
-        self.gain = settled.gain;
+        self.gain = Some(settled.gain);
         self.e = settled.e;
         self.field.sites.iter_mut().zip(settled.variance).for_each(|(site, v)| site.variance = v);
     }
 
     /// Solves E = D + K (E + extra) to `tolerance` lx from the present E, in at most `most` steps.
     ///
-    /// - `about`: what a residual is believed to bring; worked out where it is not given.
+    /// - `gain`: what a residual is believed to bring at all later bounces, in units of itself; worked out if absent.
     /// - `extra_parts`: the parts of the groups of lights in `extra`; empty as that is.
     pub(crate) fn solved(
         &self,
         transport: &Transport,
         tolerance: f32,
         most: u32,
-        about: Option<f32>,
+        gain: Option<f32>,
         extra: &[Rgb],
         extra_parts: &[Vec<Rgb>],
         flags: &Flags,
@@ -65,7 +64,7 @@ impl Refiner<'_> {
         let reflect = |e: &[Rgb]| transport.reflect(e, &[]);
         let apply = |e: &[Rgb]| transport.apply(e, extra);
         let stakes = self.stakes();
-        let mut bound = about.map_or(Bound::new(&stakes), |gain| Bound::about(&stakes, gain));
+        let mut bound = gain.map_or(Bound::new(&stakes), |gain| Bound::about(&stakes, gain));
         let (e, convergence) = solver::iterate(self.e.clone(), tolerance, most, &mut bound, apply, reflect);
         let gain = bound.gain;
         let variance = transport.variance(&e);

@@ -190,7 +190,7 @@ impl Spot<'_> {
     /// How far [`Spot::irradiance`] may be off; infinitely where nothing is known.
     pub fn doubt(&self) -> Doubt {
         let Solution { doubts, usable, values, .. } = self.solution;
-        if doubts.is_empty() || self.place == [0.0; 3] {
+        if doubts.is_empty() {
             return Doubt::default();
         }
         let known = || self.slots.iter().zip(self.place).filter(|(s, _)| usable[**s]);

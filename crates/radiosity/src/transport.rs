@@ -49,7 +49,7 @@ impl Landing {
     }
 
     /// Says where it is by the leaf that it lies in: found at once, until that is split.
-    pub fn settle(&mut self, elements: &Elements) {
+    pub fn go_to_leaf(&mut self, elements: &Elements) {
         if !elements.nodes[(self.node & !BACK) as usize].is_leaf() {
             let (leaf, _, [_, u, v]) = self.locate(elements);
             (self.node, self.uv) = (leaf | (self.node & BACK), [u, v].map(fixed));
