@@ -72,10 +72,11 @@ pub struct Args {
     /// A method whose run took longer than this climbs its ladder of settings no further
     #[arg(long, value_name = "SECONDS", default_value_t = 12.0)]
     longest: f64,
-    /// Also measure how time, memory and error grow with triangles, lamps, albedo, pixels, threads, views and the
-    /// error asked
-    #[arg(long, conflicts_with_all = ["quick", "baseline", "report", "scenes"])]
-    scaling: bool,
+    /// Also measure how time, memory and error grow with triangles, lights, albedo, pixels, threads, views, views of
+    /// the gallery (tour: other renderers too) and the error asked; all of it, or only these
+    #[arg(long, value_name = "SWEEP,...", num_args = 0..=1, default_missing_value = "all", value_delimiter = ',')]
+    #[arg(conflicts_with_all = ["quick", "baseline", "report", "scenes"])]
+    scaling: Vec<String>,
     /// Keep what results.json in --out already holds, but for the curves measured now
     #[arg(long)]
     keep: bool,
@@ -134,8 +135,10 @@ pub fn run(args: Args) -> Result<()> {
         results.rays = crate::bench_rays::speeds()?;
         results.write(&file)?;
     }
-    if args.scaling {
-        let settings = scaling::Settings { threads, longest: args.longest, out: &out, known: &subjects };
+    if !args.scaling.is_empty() {
+        let sweeps = &args.scaling;
+        let settings =
+            scaling::Settings { sweeps, threads, longest: args.longest, out: &out, known: &subjects };
         scaling::run(&settings, |sweep| {
             match results.scaling.iter_mut().find(|old| old.name == sweep.name) {
                 Some(old) => *old = sweep.clone(),

@@ -7,7 +7,7 @@ pub mod cornell;
 pub mod document;
 pub mod downlight;
 pub mod furnace;
-mod gallery;
+pub mod gallery;
 pub mod material;
 mod paint;
 mod round;

@@ -41,6 +41,17 @@ pub struct Told {
     pub notes: Vec<String>,
 }
 
+impl Told {
+    /// Adds the time of another process, and keeps the greater memory.
+    pub fn add(&mut self, other: &Told) {
+        self.seconds += other.seconds;
+        self.peak_mb = self.peak_mb.max(other.peak_mb);
+        for (stage, seconds) in &other.stages {
+            *self.stages.entry(stage.clone()).or_default() += seconds;
+        }
+    }
+}
+
 /// `twolight render --json`, as much of it as we use.
 #[derive(Deserialize)]
 struct Ours {

@@ -4,10 +4,10 @@ mod plan;
 mod rooms;
 
 use super::measure::{self, Outcome, Told};
-use super::method::{Program, Rung, Shot};
+use super::method::{Rung, Shot};
 use super::results::{Sweep, SweepLine, SweepPoint};
 use super::scene::Subject;
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use geometry::Rgb;
 use plan::{Case, Plan, Planner, Truth};
 use raytrace::exr::{Image, read_rgb};
@@ -17,6 +17,8 @@ use std::time::Duration;
 
 /// What a sweep is run with.
 pub struct Settings<'a> {
+    /// Names of the sweeps; `all` is every one.
+    pub sweeps: &'a [String],
     /// Threads, unless they are what is swept.
     pub threads: u32,
     /// Seconds; a line whose run took longer is not followed further.
@@ -31,7 +33,13 @@ pub struct Settings<'a> {
 pub fn run(settings: &Settings, mut save: impl FnMut(&Sweep) -> Result<()>) -> Result<()> {
     let folder = settings.out.join("scenes");
     let planner = Planner { folder: &folder, threads: settings.threads, known: settings.known };
-    for Plan { mut sweep, lines } in planner.plans()? {
+    let plans = planner.plans()?;
+    let known: Vec<&str> = plans.iter().map(|plan| &*plan.sweep.name).collect();
+    for name in settings.sweeps.iter().filter(|&name| name != "all") {
+        ensure!(known.contains(&&**name), "there is no sweep {name}; there are: {}", known.join(", "));
+    }
+    let wanted = |plan: &Plan| settings.sweeps.iter().any(|name| name == "all" || *name == plan.sweep.name);
+    for Plan { mut sweep, lines } in plans.into_iter().filter(wanted) {
         println!("\n{}", sweep.title);
         let empty = |(label, _): &(String, Vec<Case>)| SweepLine { label: label.clone(), points: Vec::new() };
         sweep.lines = lines.iter().map(empty).collect();
@@ -69,22 +77,32 @@ pub fn run(settings: &Settings, mut save: impl FnMut(&Sweep) -> Result<()>) -> R
 
 /// One run and what it showed, or why there is no picture.
 fn point(case: &Case, settings: &Settings) -> Result<Result<SweepPoint, String>> {
-    let out = settings.out.join("scenes/picture.exr");
+    let folder = settings.out.join("scenes");
+    let out = folder.join(plan::PICTURE);
     let rung = Rung { setting: case.args.join(" "), args: case.args.iter().map(|s| s.to_string()).collect() };
     let shot = Shot { subject: &case.subject, threads: case.threads, seed: 1, out: &out };
     let limit = Duration::from_secs_f64(8.0 * settings.longest + 60.0);
     let mut runs: Vec<Told> = Vec::new();
+    let apart = case.apart.iter().map(|camera| Subject { camera: camera.clone(), ..case.subject.clone() });
+    let subjects: Vec<Subject> =
+        if case.apart.is_empty() { vec![case.subject.clone()] } else { apart.collect() };
     while runs.is_empty() || (runs[0].seconds < measure::SHORT && runs.len() < measure::TIMES) {
-        match measure::render(Program::Twolight, &rung, shot, limit)? {
-            Outcome::Done(told) => runs.push(told),
-            Outcome::Absent(why) | Outcome::Failed(why) => return Ok(Err(why)),
+        let mut all = Told::default();
+        // The first last, so that its picture is there to be measured.
+        for subject in subjects.iter().rev() {
+            match measure::render(case.program, &rung, Shot { subject, ..shot }, limit)? {
+                Outcome::Done(told) => all.add(&told),
+                Outcome::Absent(why) | Outcome::Failed(why) => return Ok(Err(why)),
+            }
         }
+        runs.push(all);
     }
     let told = measure::median(runs);
+    let shown = || read_rgb(&folder.join(&case.first));
     let error = match case.truth {
         Truth::Unknown => None,
-        Truth::Reference => Some(metrics::compare(&read_rgb(&out)?, &case.subject.truth()?, false)?.error),
-        Truth::White => Some(metrics::compare(&read_rgb(&out)?, &white(&case.subject), false)?.error),
+        Truth::Reference => Some(metrics::compare(&shown()?, &case.subject.truth()?, false)?.error),
+        Truth::White => Some(metrics::compare(&shown()?, &white(&case.subject), false)?.error),
     };
     Ok(Ok(SweepPoint {
         x: case.x,

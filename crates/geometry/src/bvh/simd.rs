@@ -9,6 +9,10 @@
 //! 4. *Only what was pushed is popped*, so no entry is read before it is written.
 //! 5. *Rows are aligned*: nodes to 64 bytes with rows of 32, blocks to 16 with rows of 16.
 //!
+//! AddressSanitizer finds nothing in the tests of this crate, in which rays of every kind go through this file. It needs
+//! no nightly toolchain: `RUSTC_BOOTSTRAP=1 RUSTFLAGS=-Zsanitizer=address cargo test -p geometry --target
+//! x86_64-unknown-linux-gnu --lib`.
+//!
 //! Triangles are met as in `portable`, operation by operation and without fused multiply-add, hence with the same
 //! bits. Boxes need not be: they are wide enough by either arithmetic to hold what is met in them, and here fused
 //! multiply-add makes a camera ray 5 % faster, a shadow ray 9 %. `max(a, b)` and `min(a, b)` return b when either is

@@ -1,6 +1,7 @@
 //! What is swept: a plan for each sweep, its scenes written to a folder.
 
 use super::rooms;
+use crate::comparison::method::Program;
 use crate::comparison::results::Sweep;
 use crate::comparison::scene::Subject;
 use crate::scenes::cornell::{cornell_box_in, cornell_specular_in};
@@ -24,9 +25,15 @@ pub struct Case {
     pub x: f64,
     /// What is seen, and how large; a camera called `all` means every camera of the file.
     pub subject: Subject,
+    /// Cameras of the file that get a process each, in place of that of `subject`; none: one process does it all.
+    pub apart: Vec<String>,
+    /// The picture that is held against the truth: the first of several.
+    pub first: PathBuf,
+    /// What renders.
+    pub program: Program,
     /// Threads to render with.
     pub threads: u32,
-    /// What `twolight render` is told beside that.
+    /// What it is told beside that.
     pub args: &'static [&'static str],
     /// What the picture is held against.
     pub truth: Truth,
@@ -49,6 +56,14 @@ const PATH: &[&str] = &["--integrator", "path", "--spp", "16"];
 /// Their labels.
 const METHODS: [(&str, &[&str]); 2] =
     [("twolight split, --error 3%", SPLIT), ("twolight path, 16 spp", PATH)];
+/// Where each picture goes.
+pub const PICTURE: &str = "picture.exr";
+/// The gallery at 5 %, and what other renderers take there for about as much: label, script, samples.
+const FIVE: &[&str] = &["--error", "5%"];
+const OTHERS: [(&str, &str, &[&str]); 2] = [
+    ("Mitsuba path + OIDN, 64 spp", "mitsuba", &["--effort", "64", "--denoise"]),
+    ("Cycles + OIDN, 64 spp", "cycles", &["--effort", "64", "--denoise"]),
+];
 /// Errors asked, and the number that stands for each on an axis, %.
 const ERRORS: [(f64, &[&str]); 6] = [
     (10.0, &["--error", "10%"]),
@@ -81,6 +96,7 @@ impl Planner<'_> {
             self.pixels()?,
             self.threads()?,
             self.views()?,
+            self.tour()?,
         ])
     }
 
@@ -179,6 +195,39 @@ impl Planner<'_> {
         Ok(self.by_method("views", "Cost against views of one room, in one call", "views", &subjects))
     }
 
+    /// More and more views of a furnished room: solved once for all, or each by itself, as other renderers do. The error is that of
+    /// the first.
+    fn tour(&self) -> Result<Plan> {
+        let gallery = self.known.iter().find(|s| s.name == "gallery");
+        let (mut once, mut apart, mut others) = (Vec::new(), Vec::new(), OTHERS.map(|_| Vec::new()));
+        for n in [1, 3, 10] {
+            let (doc, cameras) = rooms::tour(n);
+            let (camera, first) = match n {
+                1 => (&*cameras[0], PICTURE.into()),
+                _ => ("all", Path::new(PICTURE).with_extension(format!("{}.exr", cameras[0]))),
+            };
+            let mut subject = self.subject(&format!("tour-{n}"), doc, camera, 384)?;
+            subject.height = 256;
+            subject.reference = gallery.map(|s| s.reference.clone()).unwrap_or_default();
+            let truth = if gallery.is_some() { Truth::Reference } else { Truth::Unknown };
+            let case = |program, args| Case {
+                truth: truth.clone(),
+                program,
+                apart: cameras.clone(),
+                ..self.case(f64::from(n), subject.clone(), args)
+            };
+            once.push(Case { apart: Vec::new(), first, ..case(Program::Twolight, FIVE) });
+            apart.push(case(Program::Twolight, FIVE));
+            for (line, (_, name, args)) in others.iter_mut().zip(OTHERS) {
+                line.push(case(Program::Peer(name), args));
+            }
+        }
+        let ours = [("twolight, solved once", once), ("twolight, each view by itself", apart)];
+        let others = OTHERS.iter().zip(others).map(|((label, ..), cases)| (*label, cases));
+        let lines = ours.into_iter().chain(others).map(|(label, cases)| (label.to_string(), cases)).collect();
+        Ok(plan("tour", "Cost against views of the gallery, at about 5 %", "views", lines))
+    }
+
     /// A line for each of [`METHODS`] over the same subjects.
     fn by_method(&self, name: &str, title: &str, axis: &str, subjects: &[(f64, Subject)]) -> Plan {
         let line = |(label, args): (&str, _)| {
@@ -189,7 +238,9 @@ impl Planner<'_> {
     }
 
     fn case(&self, x: f64, subject: Subject, args: &'static [&'static str]) -> Case {
-        Case { x, subject, threads: self.threads, args, truth: Truth::Unknown }
+        let (apart, program) = (Vec::new(), Program::Twolight);
+        let first = PICTURE.into();
+        Case { x, subject, apart, first, program, threads: self.threads, args, truth: Truth::Unknown }
     }
 
     /// Writes a scene, to be seen in a square picture of `size` pixels a side.
