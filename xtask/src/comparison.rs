@@ -21,6 +21,7 @@ mod scene;
 
 use anyhow::{Context, Result, ensure};
 use anywhere::Making;
+use clap::builder::PossibleValuesParser;
 use climb::Climber;
 use method::Method;
 pub use process::{Measured, measured};
@@ -72,9 +73,10 @@ pub struct Args {
     /// A method whose run took longer than this climbs its ladder of settings no further
     #[arg(long, value_name = "SECONDS", default_value_t = 12.0)]
     longest: f64,
-    /// Also measure how time, memory and error grow with triangles, lights, albedo, pixels, threads, views, views of
-    /// the gallery (tour: other renderers too) and the error asked; all of it, or only these
-    #[arg(long, value_name = "SWEEP,...", num_args = 0..=1, default_missing_value = "all", value_delimiter = ',')]
+    /// Also measure how time, memory and error grow with triangles, lights and so on: with all of these, or only some. Sweeps
+    /// heed neither --methods nor --peers: `tour`, views of the gallery, runs other renderers too
+    #[arg(long, value_name = "SWEEP,...", num_args = 0..=1, default_missing_value = scaling::ALL, value_delimiter = ',')]
+    #[arg(value_parser = PossibleValuesParser::new(scaling::names()))]
     #[arg(conflicts_with_all = ["quick", "baseline", "report", "scenes"])]
     scaling: Vec<String>,
     /// Keep what results.json in --out already holds, but for the curves measured now

@@ -46,7 +46,11 @@ impl Told {
     pub fn add(&mut self, other: &Told) {
         self.seconds += other.seconds;
         self.peak_mb = self.peak_mb.max(other.peak_mb);
-        for (stage, seconds) in &other.stages {
+        self.add_stages(&other.stages);
+    }
+
+    fn add_stages(&mut self, stages: &BTreeMap<String, f64>) {
+        for (stage, seconds) in stages {
             *self.stages.entry(stage.clone()).or_default() += seconds;
         }
     }
@@ -130,9 +134,7 @@ fn told(program: Program, ran: &Ran) -> Result<Told> {
         Program::Twolight => {
             let report: Ours = serde_json::from_str(&ran.stdout)?;
             for picture in &report.pictures {
-                for (stage, seconds) in &picture.stages {
-                    *told.stages.entry(stage.clone()).or_default() += seconds;
-                }
+                told.add_stages(&picture.stages);
             }
             told.rays = report.pictures.iter().map(|picture| picture.rays).sum();
         }

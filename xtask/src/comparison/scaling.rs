@@ -7,17 +7,25 @@ use super::measure::{self, Outcome, Told};
 use super::method::{Rung, Shot};
 use super::results::{Sweep, SweepLine, SweepPoint};
 use super::scene::Subject;
-use anyhow::{Result, ensure};
+use anyhow::Result;
 use geometry::Rgb;
-use plan::{Case, Plan, Planner, Truth};
+use plan::{Case, Plan, Planner, SWEEPS, Truth};
 use raytrace::exr::{Image, read_rgb};
 use raytrace::metrics::{self, Reference};
 use std::path::Path;
 use std::time::Duration;
 
+/// In place of every name.
+pub const ALL: &str = "all";
+
+/// What `--scaling` takes.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    std::iter::once(ALL).chain(SWEEPS.map(|(name, _)| name))
+}
+
 /// What a sweep is run with.
 pub struct Settings<'a> {
-    /// Names of the sweeps; `all` is every one.
+    /// Some of [`names`].
     pub sweeps: &'a [String],
     /// Threads, unless they are what is swept.
     pub threads: u32,
@@ -33,13 +41,8 @@ pub struct Settings<'a> {
 pub fn run(settings: &Settings, mut save: impl FnMut(&Sweep) -> Result<()>) -> Result<()> {
     let folder = settings.out.join("scenes");
     let planner = Planner { folder: &folder, threads: settings.threads, known: settings.known };
-    let plans = planner.plans()?;
-    let known: Vec<&str> = plans.iter().map(|plan| &*plan.sweep.name).collect();
-    for name in settings.sweeps.iter().filter(|&name| name != "all") {
-        ensure!(known.contains(&&**name), "there is no sweep {name}; there are: {}", known.join(", "));
-    }
-    let wanted = |plan: &Plan| settings.sweeps.iter().any(|name| name == "all" || *name == plan.sweep.name);
-    for Plan { mut sweep, lines } in plans.into_iter().filter(wanted) {
+    let wanted = |sweep: &str| settings.sweeps.iter().any(|name| name == ALL || name == sweep);
+    for Plan { mut sweep, lines } in planner.plans(wanted)? {
         println!("\n{}", sweep.title);
         let empty = |(label, _): &(String, Vec<Case>)| SweepLine { label: label.clone(), points: Vec::new() };
         sweep.lines = lines.iter().map(empty).collect();

@@ -16,7 +16,10 @@ use super::document::Document;
 use glam::DVec3;
 use palette::Palette;
 
-/// The scene and its three cameras: `main`, `second-room` and `detail`.
+/// Names of its cameras.
+pub const CAMERAS: [&str; 3] = ["main", "second-room", "detail"];
+
+/// The scene and its three cameras.
 pub fn gallery() -> Document {
     let mut doc = Document::default();
     let palette = Palette::new(&mut doc);
@@ -34,9 +37,10 @@ pub fn gallery() -> Document {
         [14.0, 26.0],
     );
 
+    let [main, second_room, detail] = CAMERAS;
     // Composed for 3:2. From the corner by the left wall, along the room's diagonal.
-    doc.camera("main", DVec3::new(0.9, 1.5, 4.5), DVec3::new(5.2, 1.2, 1.95), 52.0, 1.5);
-    doc.camera("second-room", DVec3::new(12.6, 1.5, 0.7), DVec3::new(8.9, 1.1, 2.9), 50.0, 1.5);
-    doc.camera("detail", DVec3::new(4.75, 1.05, 3.45), DVec3::new(5.9, 0.5, 2.4), 34.0, 1.5);
+    doc.camera(main, DVec3::new(0.9, 1.5, 4.5), DVec3::new(5.2, 1.2, 1.95), 52.0, 1.5);
+    doc.camera(second_room, DVec3::new(12.6, 1.5, 0.7), DVec3::new(8.9, 1.1, 2.9), 50.0, 1.5);
+    doc.camera(detail, DVec3::new(4.75, 1.05, 3.45), DVec3::new(5.9, 0.5, 2.4), 34.0, 1.5);
     doc
 }

@@ -11,22 +11,23 @@
 //!
 //! Rays a second, as ratios to those of Embree 3.13 (single rays, default, not watertight; its robust mode is at 0.77
 //! to 0.89) on the same rays in the same run, one thread of a Zen 3 with AVX2, by `cargo xtask bench rays --fast`. The
-//! machine was busy: ± 0.08.
+//! machine was busy; where there are two numbers they are the least and the greatest of two or more runs.
 //!
 //! | scene | triangles | camera | diffuse | shadow | build, CPU s | bytes per triangle |
 //! |---|---|---|---|---|---|---|
-//! | `room` | 49 164 | 1.07 | 0.84 | 1.09 | 0.07 | 74 |
+//! | `room` | 49 164 | 1.00–1.14 | 0.82–0.96 | 0.93–1.10 | 0.07 | 74 |
 //! | kitchen | 56 904 | 1.11 | 1.16 | 1.43 | 0.09 | 80 |
-//! | `assets/gallery.glb` | 72 724 | 1.44 | 1.22 | 1.97 | 0.08 | 76 |
+//! | `assets/gallery.glb` | 72 724 | 1.44–1.73 | 1.22–1.26 | 1.46–1.97 | 0.08 | 76 |
 //! | classroom | 103 830 | 1.14 | 1.06 | 1.03 | 0.15 | 84 |
 //! | a study, after Veach | 382 615 | 1.23 | 1.10 | 1.09 | 0.60 | 73 |
-//! | white room | 400 090 | 1.04 | 0.95 | 1.15 | 0.63 | 73 |
-//! | `million` | 995 340 | 0.98 | 0.76 | 0.88 | 1.86 | 76 |
+//! | white room | 400 090 | 1.01–1.04 | 0.84–0.95 | 1.07–1.15 | 0.63 | 73 |
+//! | `million` | 995 340 | 0.89–1.02 | 0.68–0.79 | 0.81–0.96 | 1.86 | 76 |
 //!
-//! In `million` incoherent rays wait for memory: pages of 2 MB gave them 3 to 8 % (not done: it takes a system call
-//! that the standard library does not make). Nodes are a fifth of the tree, blocks, of which 2.7 places in 4 are taken, the rest: with
-//! boxes quantised to 8 bits a side (128 bytes a node instead of 256) diffuse rays there are a fifth faster, but camera and shadow rays
-//! 5 to 9 % slower, and in rooms all are slower by 5 to 30 %.
+//! In `million` incoherent rays wait for memory: pages of 2 MB gave them 3 to 8 % once, and nothing beyond noise in four
+//! later pairs of runs (not done: it takes a system call that the standard library does not make). Nodes are a fifth of
+//! the tree, blocks, of which 2.7 places in 4 are taken, the rest: with boxes quantised to 8 bits a side (128 bytes a
+//! node instead of 256) diffuse rays there were a fifth faster, camera and shadow rays 5 to 9 % slower; in `room`, the
+//! gallery and the white room camera and shadow rays were 8 to 25 % slower, diffuse ones by 0 to 30 % (a run each).
 //!
 //! What is left to gain: of a render at 5 % (kitchen, staircase) or of a view of the gallery from a solution, all
 //! traversal takes 13 to 17 %, camera rays 1 to 2 % (`perf record`). Packets for them could save no more than that and are

@@ -84,23 +84,29 @@ pub struct Planner<'a> {
     pub known: &'a [Subject],
 }
 
+/// Makes one plan.
+type Make = fn(&Planner) -> Result<Plan>;
+
+/// Every sweep, by its name.
+pub const SWEEPS: [(&str, Make); 8] = [
+    ("error", |planner| planner.error()),
+    ("triangles", |planner| planner.triangles()),
+    ("lights", |planner| planner.lights()),
+    ("albedo", |planner| planner.albedo()),
+    ("pixels", |planner| planner.pixels()),
+    ("threads", |planner| planner.threads()),
+    ("views", |planner| planner.views()),
+    ("tour", |planner| planner.tour()),
+];
+
 impl Planner<'_> {
-    /// Every sweep.
-    pub fn plans(&self) -> Result<Vec<Plan>> {
+    /// Those sweeps whose names are `wanted`.
+    pub fn plans(&self, wanted: impl Fn(&str) -> bool) -> Result<Vec<Plan>> {
         std::fs::create_dir_all(self.folder).with_context(|| format!("making {}", self.folder.display()))?;
-        Ok(vec![
-            self.error(),
-            self.triangles()?,
-            self.lights()?,
-            self.albedo()?,
-            self.pixels()?,
-            self.threads()?,
-            self.views()?,
-            self.tour()?,
-        ])
+        SWEEPS.iter().filter(|(name, _)| wanted(name)).map(|(_, make)| make(self)).collect()
     }
 
-    fn error(&self) -> Plan {
+    fn error(&self) -> Result<Plan> {
         let line = |subject: &Subject| {
             let case =
                 |(x, args)| Case { args, truth: Truth::Reference, ..self.case(x, subject.clone(), SPLIT) };
@@ -108,12 +114,8 @@ impl Planner<'_> {
         };
         // Of a black room no error is relative.
         let lit = self.known.iter().filter(|s| s.name != "two-rooms");
-        plan(
-            "error",
-            "Cost against the error asked, twolight split",
-            "error asked, %",
-            lit.map(line).collect(),
-        )
+        let title = "Cost against the error asked, twolight split";
+        Ok(plan("error", title, "error asked, %", lit.map(line).collect()))
     }
 
     /// The same surfaces in ever smaller triangles: the same picture, so that one reference serves all.

@@ -1,7 +1,7 @@
 //! Rooms that exist to grow: written beside the results, never into `assets/`.
 
 use crate::scenes::document::Document;
-use crate::scenes::gallery::gallery;
+use crate::scenes::gallery::{CAMERAS, gallery};
 use crate::scenes::material::Material;
 use crate::scenes::shapes::Shape;
 use glam::DVec3;
@@ -42,12 +42,11 @@ pub fn room(lamps: u32, rho: f64, views: u32) -> Document {
     doc
 }
 
-/// The gallery with `views` cameras, and their names: its own three, of which the first took the reference, or as many as are
-/// wanted, and more around the middle of the first room.
+/// The gallery and the names of `views` of its cameras: of its own three, the first of which took the reference, and where that
+/// is not enough of more around the middle of the first room.
 pub fn tour(views: u32) -> (Document, Vec<String>) {
     let mut doc = gallery();
-    let mut names: Vec<String> =
-        ["main", "second-room", "detail"].iter().take(views as usize).map(|s| s.to_string()).collect();
+    let mut names: Vec<String> = CAMERAS.iter().take(views as usize).map(|s| s.to_string()).collect();
     for i in 3..views {
         let (sin, cos) = (TAU * f64::from(i - 3) / f64::from(views - 3)).sin_cos();
         let from = DVec3::new(4.0 + 3.2 * cos, 1.6, 2.5 + 1.9 * sin);
