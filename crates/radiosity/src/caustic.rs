@@ -4,15 +4,18 @@
 //! surface after at least one specular event. Density estimation gives irradiance back: Jensen, "Global
 //! Illumination using Photon Maps", EGWR 1996. What the gather rays already count ([`crate::gather`]) is left out.
 
+mod targets;
+
 use crate::bytes::{Plain, Reader, put_all, record};
 use crate::element::{Elements, Side, slot};
 use crate::gather::ROUGH;
 use geometry::bsdf::Transport;
+use geometry::emitter::{Emission, Target};
 use geometry::math::offset_origin;
 use geometry::sampling::Rng;
 use geometry::{LightGroups, Mesh, Passage, Ray, Rgb, Vec3, World};
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use targets::Fate;
 
 /// Photons that one estimate of irradiance uses where there are [`FEW_PHOTONS`] or fewer. With 80 the shadow of a shelf under
 /// a table of glass is blurred: the gallery's error at 5 % is larger by a hundredth of itself.
@@ -80,8 +83,8 @@ pub struct Caustics {
 
 impl Caustics {
     /// Sends `particles` from the emitters, fewer when little light comes this way; none when nothing in the scene reflects or refracts sharply.
-    pub fn trace(world: &World, elements: &Elements, particles: usize, seed: u64) -> Caustics {
-        Caustics::trace_groups(world, elements, particles, 0, seed, None)
+    pub fn trace(world: &World, particles: usize, seed: u64) -> Caustics {
+        Caustics::trace_groups(world, particles, 0, seed, None)
     }
 
     /// The same, each photon with the group of lights that it came from.
@@ -89,41 +92,46 @@ impl Caustics {
     /// - `gathered`: rays that gathering took.
     pub(crate) fn trace_groups(
         world: &World,
-        elements: &Elements,
         particles: usize,
         gathered: usize,
         seed: u64,
         groups: Option<&LightGroups>,
     ) -> Caustics {
-        let targets = targets(world, elements);
+        let mut targets = targets::targets(world);
         if targets.is_empty() || world.emitters.is_empty() {
             return Caustics::default();
         }
-        let rays = AtomicUsize::new(0);
-        let batches = |which: std::ops::Range<usize>| -> Vec<Photon> {
+        let batches = |targets: &[Target], which: std::ops::Range<usize>| -> Vec<Batch> {
             let send_batch = |batch: usize| {
-                let (mut landed, mut cast) = (Vec::new(), 0);
+                let mut sent = Batch::default();
                 for i in 0..BATCH {
                     let mut rng = Rng::new(seed ^ 0x7068_6f74_6f6e, (batch * BATCH + i) as u64);
-                    cast += send(world, &targets, groups, &mut rng, &mut landed);
+                    sent.send(world, targets, groups, &mut rng);
                 }
-                rays.fetch_add(cast, Ordering::Relaxed);
-                landed
+                sent
             };
-            which.into_par_iter().flat_map_iter(send_batch).collect()
+            which.into_par_iter().map(send_batch).collect()
         };
         // A pilot tells what share of all light comes this way; a small share may be blurred more for the same error.
-        let pilot = PILOT.min(particles.div_ceil(BATCH));
-        let mut photons = batches(0..pilot);
-        let flux = photons.iter().map(|p| p.flux.luminance()).sum::<f32>() / (pilot * BATCH) as f32;
-        let power: f32 = world.emitters.power().iter().map(|p| p.luminance()).sum();
-        let each = rays.load(Ordering::Relaxed) as f32 / (pilot * BATCH) as f32;
-        let cheap = if photons.is_empty() { 0.0 } else { CHEAP * gathered as f32 / each.max(1.0) };
-        let wanted = (particles as f32 * (flux / (MATTERS * power).max(1e-30)).min(1.0))
-            .max(cheap.min(particles as f32));
-        let last = (wanted as usize / BATCH).max(pilot);
-        photons.extend(batches(pilot..last));
-        let share = 1.0 / (last * BATCH) as f32;
+        // It also tells by way of what, and is forgotten when others have been sent there.
+        let all = particles.div_ceil(BATCH);
+        let pilot = PILOT.min(all);
+        let mut sent = batches(&targets, 0..pilot);
+        if all > pilot {
+            let fates: Vec<Fate> = sent.iter().flat_map(|batch| batch.fates.iter().copied()).collect();
+            let flux = fates.iter().map(|f| f.1).sum::<f32>() / fates.len() as f32;
+            let rays: usize = sent.iter().map(|batch| batch.rays).sum();
+            let power: f32 = world.emitters.power().iter().map(|p| p.luminance()).sum();
+            let each = rays as f32 / fates.len() as f32;
+            let cheap = if flux > 0.0 { CHEAP * gathered as f32 / each.max(1.0) } else { 0.0 };
+            let share = (flux / (MATTERS * power).max(1e-30)).min(1.0);
+            let wanted = (particles as f32 * share).max(cheap.min(particles as f32));
+            targets::weigh(&mut targets, &fates);
+            sent = batches(&targets, pilot..pilot + (wanted as usize / BATCH).max(pilot));
+        }
+        let particles = sent.len() * BATCH;
+        let mut photons: Vec<Photon> = sent.into_iter().flat_map(|batch| batch.landed).collect();
+        let share = 1.0 / particles as f32;
         for photon in &mut photons {
             photon.flux *= share;
         }
@@ -131,7 +139,7 @@ impl Caustics {
         let mut axes = vec![0; photons.len()];
         balance(&mut photons, &mut axes);
         let reach = reach(world, photons.len());
-        Caustics { photons, axes, reach, sent: last * BATCH }
+        Caustics { photons, axes, reach, sent: particles }
     }
 
     /// Number of photons kept.
@@ -317,43 +325,35 @@ impl Caustics {
     }
 }
 
-/// Bounding spheres of the pieces of surface that reflect or refract sharply, the largest few.
-fn targets(world: &World, elements: &Elements) -> Vec<(Vec3, f32)> {
-    let mesh = &world.scene.mesh;
-    let sharp: Vec<bool> = world
-        .scene
-        .materials
-        .iter()
-        .map(|m| m.sharpest_roughness().powi(2) < ROUGH && m.has_specular(0.02))
-        .collect();
-    let mut bounds: Vec<Option<(Vec3, Vec3)>> = vec![None; elements.pieces as usize];
-    for (t, material) in mesh.materials.iter().enumerate() {
-        if !sharp[material.0 as usize] {
-            continue;
+/// What came of some particles.
+#[derive(Default)]
+struct Batch {
+    landed: Vec<Photon>,
+    /// Of each particle.
+    fates: Vec<Fate>,
+    rays: usize,
+}
+
+impl Batch {
+    /// Sends one particle more.
+    fn send(&mut self, world: &World, targets: &[Target], groups: Option<&LightGroups>, rng: &mut Rng) {
+        let (mut fate, before) = ((None, 0.0), self.landed.len());
+        if let Some(start) = world.emitters.emit_toward(&world.scene, targets, rng.array()) {
+            self.rays += follow(world, start, groups, rng, &mut self.landed);
+            fate = (start.target, self.landed[before..].iter().map(|p| p.flux.luminance()).sum());
         }
-        let Some(piece) = elements.piece(t as u32) else { continue };
-        let [a, b, c] = mesh.corners(t as u32);
-        let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
-        let entry = bounds[piece as usize].get_or_insert((lo, hi));
-        *entry = (entry.0.min(lo), entry.1.max(hi));
+        self.fates.push(fate);
     }
-    let mut spheres: Vec<(Vec3, f32)> =
-        bounds.into_iter().flatten().map(|(lo, hi)| (0.5 * (lo + hi), 0.5 * (hi - lo).length())).collect();
-    spheres.sort_by(|a, b| b.1.total_cmp(&a.1));
-    spheres.truncate(32); // each particle weighs all of them
-    spheres
 }
 
 /// One particle's way; how many rays it took.
-fn send(
+fn follow(
     world: &World,
-    targets: &[(Vec3, f32)],
+    start: Emission,
     groups: Option<&LightGroups>,
     rng: &mut Rng,
     landed: &mut Vec<Photon>,
 ) -> usize {
-    let u = rng.array();
-    let Some(start) = world.emitters.emit_toward(&world.scene, targets, u) else { return 0 };
     let mut flux = start.flux;
     let mut ray = start.ray;
     let mut specular = 0;

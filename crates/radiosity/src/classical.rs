@@ -128,7 +128,7 @@ impl<'a> Room<'a> {
         }
         let lamps = patches.lamps(world, config.seed);
         progress.stage("caustics", 1);
-        let caustics = Caustics::trace(world, &patches.elements, config.photons, config.seed);
+        let caustics = Caustics::trace(world, config.photons, config.seed);
         let flux = caustics.at_elements(&patches.elements);
         let photons = match flux.is_empty() {
             true => Vec::new(),

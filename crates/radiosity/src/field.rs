@@ -103,6 +103,12 @@ pub struct Field {
     connected: usize,
 }
 
+/// Lift of a line between two vertices, in units of its length: where their normals agree, and for each unit between these,
+/// for an arc rises above its chord by an eighth of the angle. At 0.3 everywhere a wall heard of its light from the front
+/// of a picture that hangs two centimetres before it.
+const LIFT: f32 = 0.02;
+const LIFT_OF_ARCS: f32 = 0.3;
+
 /// A site most of whose rays first meet a dead side is buried in an object.
 pub(crate) const BURIED: f32 = 0.5;
 
@@ -238,12 +244,13 @@ fn near(world: &World, vertices: &[Vertex], grid: &Grid, site_of: &[u32], v: Ver
     Source::Near(sites, weights.map(|w| w / sum))
 }
 
-/// Whether nothing stands between two vertices. The line is lifted by a good part of its length, for on a curved
-/// surface the chord runs through the solid.
+/// Whether nothing stands between two vertices. The line is lifted by some of its length, more where the surface is
+/// curved, for there the chord runs through the solid.
 fn sees(world: &World, a: &Vertex, b: &Vertex, side: Side) -> bool {
     let lift =
         |v: &Vertex, d: f32| offset_origin(v.position, v.normal * side.sign()) + v.normal * (side.sign() * d);
-    let d = (0.3 * a.position.distance(b.position)).max(1e-4 * world.scale);
+    let lifted = LIFT + LIFT_OF_ARCS * a.normal.distance(b.normal);
+    let d = (lifted * a.position.distance(b.position)).max(1e-4 * world.scale);
     let (from, to) = (lift(a, d), lift(b, d));
     let length = from.distance(to);
     if length <= 0.0 {
@@ -256,6 +263,31 @@ fn sees(world: &World, a: &Vertex, b: &Vertex, side: Side) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use geometry::{Material, MaterialId, Mesh, Scene, Vec3};
+
+    /// Squares around the z axis, facing along it: half their sides and their heights, m.
+    fn squares(all: &[(f32, f32)]) -> World {
+        let mut mesh = Mesh::default();
+        for &(r, z) in all {
+            let first = mesh.positions.len() as u32;
+            mesh.positions.extend([(-r, -r), (r, -r), (r, r), (-r, r)].map(|(x, y)| Vec3::new(x, y, z)));
+            mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+        }
+        mesh.normals = vec![Vec3::Z; mesh.positions.len()];
+        mesh.materials = vec![MaterialId(0); mesh.triangles.len()];
+        World::new(Scene { mesh, materials: vec![Material::default()], ..Scene::default() })
+    }
+
+    #[test]
+    fn a_wall_does_not_hear_of_the_light_before_a_picture_on_it() {
+        let world = squares(&[(1.0, 0.0), (0.3, 0.02)]);
+        let at =
+            |x: f32, z: f32| Vertex { position: Vec3::new(x, 0.0, z), normal: Vec3::Z, piece: 0, face: 0 };
+        let sees = |a: Vertex, b: Vertex| sees(&world, &a, &b, Side::Front);
+        assert!(!sees(at(0.25, 0.0), at(0.15, 0.02)), "through the picture");
+        assert!(sees(at(0.4, 0.0), at(0.6, 0.0)), "along the wall");
+        assert!(sees(at(0.1, 0.02), at(0.25, 0.02)), "along the picture");
+    }
 
     #[test]
     fn collecting_is_the_transpose_of_spreading() {

@@ -104,7 +104,7 @@ impl Refiner<'_> {
         let usable = |s: usize| usable[s];
         let (world, elements) = (self.world, &self.elements);
         Transport::locate(elements, &self.field, |node, side, w| {
-            visible_weights(world, elements, flags, usable, node, side, w)
+            visible_weights(world, elements, flags, usable, node, side, w).map(|voices| voices.weights)
         })
     }
 

@@ -4,7 +4,7 @@ use crate::caustic::Caustics;
 use crate::doubt::Doubt;
 use crate::element::{Elements, Side, slot};
 use crate::field::Sources;
-use crate::flags::{Flags, visible_weights};
+use crate::flags::{Flags, Voices, visible_weights};
 use crate::lights::Lights;
 use crate::refine::Refiner;
 use crate::solver::Convergence;
@@ -163,7 +163,7 @@ pub struct Spot<'a> {
     /// Its weights among them; all 0 for a triangle without area.
     place: [f32; 3],
     /// The same for those that may speak for it; `None` where none may.
-    spoken: Option<[f32; 3]>,
+    spoken: Option<Voices>,
     /// The leaf is flagged as one that the mesh does not resolve.
     unresolved: bool,
 }
@@ -203,7 +203,9 @@ impl Spot<'_> {
         // What a buried corner would have said is anybody's guess, and where it lies shadows are near.
         let e: f32 = known().map(|(&s, w)| values[s].mean() * w).sum::<f32>() / sum;
         let buried = self.unresolved && self.slots.iter().any(|&s| !usable[s]);
-        let guess = if buried { (GUESS * e).powi(2) } else { 0.0 };
+        // So is what one beyond a wall would: the others may be as far from the place as it is.
+        let silenced = self.spoken.map_or(0.0, |said| said.silenced);
+        let guess = (GUESS * e).powi(2) * if buried { 1.0 } else { silenced };
         Doubt { mesh: doubt.mesh + guess, ..doubt }
     }
 
@@ -217,7 +219,7 @@ impl Spot<'_> {
     }
 
     fn interpolate(&self, values: &[Rgb]) -> Rgb {
-        self.spoken.map_or(Rgb::BLACK, |w| (0..3).map(|i| values[self.slots[i]] * w[i]).sum())
+        self.spoken.map_or(Rgb::BLACK, |said| (0..3).map(|i| values[self.slots[i]] * said.weights[i]).sum())
     }
 }
 

@@ -166,8 +166,7 @@ pub fn solve_resumable(
     let groups = refiner.groups.as_ref();
     // Beside each ray that lands goes a shadow ray.
     let gathered = 2 * refiner.landings();
-    let caustics =
-        Caustics::trace_groups(world, &refiner.elements, config.photons, gathered, config.seed, groups);
+    let caustics = Caustics::trace_groups(world, config.photons, gathered, config.seed, groups);
     let usable = |slot| refiner.field.usable(slot);
     let extra = caustics.at_vertices(&refiner.elements, usable);
     let extra_parts: Vec<Vec<Rgb>> = (0..groups.map_or(0, LightGroups::len))

@@ -70,7 +70,12 @@ impl<'a> Adaptive<'a> {
     fn shade(&self, i: u32, effort: Effort) -> Shot {
         let before = self.shots.get(i as usize).and_then(Option::as_ref);
         let (x, y) = (i % self.view.width, i / self.view.width);
-        shade(self.hybrid, self.view, x, y, effort, before, self.seed)
+        let mut shot = shade(self.hybrid, self.view, x, y, effort, before, self.seed);
+        // Edges are better off with one grid; what chance finds in a gloss is not thrown away.
+        if let Some(before) = before.filter(|b| b.specular && shot.specular && b.effort.camera > 1) {
+            shot.join(before);
+        }
+        shot
     }
 
     /// The picture, with the noise that is estimated for each pixel, and the error that this amounts to.

@@ -90,6 +90,17 @@ pub struct Shot {
     pub gathered: Option<Gathered>,
 }
 
+impl Shot {
+    /// Adds what was seen `before`, with fewer rays.
+    pub fn join(&mut self, before: &Shot) {
+        let share = before.pixel.samples as f32 / (before.pixel.samples + self.pixel.samples) as f32;
+        let of = |old: f32, new: f32| old * share * share + new * (1.0 - share) * (1.0 - share);
+        self.camera_variance = of(before.camera_variance, self.camera_variance);
+        self.light_variance = of(before.light_variance, self.light_variance);
+        self.pixel = self.pixel.merged(&before.pixel);
+    }
+}
+
 /// One surface seen through a pixel: hits that belong together.
 struct Group {
     key: Key,
@@ -276,7 +287,7 @@ fn one_surface(
     let per_albedo = lit.irradiance.luminance() / std::f32::consts::PI;
     for &i in &g.hits {
         let (ray, surface) = &hits[i];
-        let beside = hybrid.beside_diffuse(surface, ray, &plan, rng);
+        let beside = hybrid.beside_diffuse(surface, ray, &plan, effort.camera, rng);
         p.emission += beside.emission * share;
         sum += beside.specular;
         let mut level = beside.specular.luminance();

@@ -11,7 +11,6 @@ use geometry::sampling::{Lattice2, Rng};
 use geometry::{Material, World};
 use radiosity::Config;
 use radiosity::caustic::Caustics;
-use radiosity::element::Elements;
 use radiosity::gather::ROUGH;
 use rayon::prelude::*;
 
@@ -143,7 +142,7 @@ fn shares(world: &World, view: &View, seed: u64) -> [(f64, f64); 4] {
 
 /// Share of the lamps' light that comes to diffuse surfaces by way of mirrors and glass alone, and how it is found.
 fn caustics(world: &World, config: &Config, seed: u64) -> (f64, String) {
-    let pilot = Caustics::trace(world, &Elements::new(&world.scene.mesh), PARTICLES, seed);
+    let pilot = Caustics::trace(world, PARTICLES, seed);
     let power: f32 = world.emitters.power().iter().map(|p| p.luminance()).sum();
     let share = f64::from(pilot.flux().luminance()) / f64::from(power).max(f64::MIN_POSITIVE);
     match pilot.is_empty() {

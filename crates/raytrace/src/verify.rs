@@ -19,7 +19,6 @@ use crate::pixel::View;
 use geometry::World;
 use geometry::sampling::Rng;
 use radiosity::caustic::Caustics;
-use radiosity::element::Elements;
 use radiosity::{Config, Progress};
 use rayon::prelude::*;
 
@@ -133,7 +132,7 @@ impl Probes {
         let weights = Weights::new(film);
         // The probes are few, and other noise is larger.
         let particles = Config::for_error(asked).photons / 4;
-        let caustics = Caustics::trace(world, &Elements::new(&world.scene.mesh), particles, seed);
+        let caustics = Caustics::trace(world, particles, seed);
         let caustics = Some(&caustics).filter(|c| !c.is_empty());
         progress.stage("verifying", 2 * cells.len() as u64);
         let before = world.bvh.rays_cast();

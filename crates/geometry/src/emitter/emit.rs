@@ -18,6 +18,19 @@ pub struct Emission {
     pub light: u32,
     /// How far the lamp reaches, m; infinite but for lamps with a range.
     pub range: f32,
+    /// The target it was sent to, by its number; `None` for one that was not guided.
+    pub target: Option<usize>,
+}
+
+/// A sphere that light is sent toward.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Target {
+    /// Its middle.
+    pub centre: Vec3,
+    /// Its radius, m, > 0.
+    pub radius: f32,
+    /// Rays for the solid angle it fills, beside those for other targets; > 0.
+    pub weight: f32,
 }
 
 impl Emission {
@@ -30,10 +43,13 @@ impl Emission {
 /// Half of the guided rays are drawn as if unguided, so that no light goes missing and no weight exceeds two.
 const UNGUIDED: f32 = 0.5;
 
+/// A ray, what it carries (lm), and the target it was sent to.
+type Way = (Ray, Rgb, Option<usize>);
+
 /// One draw in the making.
 struct Start<'a> {
     emitters: &'a Emitters,
-    targets: &'a [(Vec3, f32)],
+    targets: &'a [Target],
     /// Chooses guided or not, and the target.
     u: f32,
     /// Of the light.
@@ -48,19 +64,18 @@ impl Emitters {
         self.emit_toward(scene, &[], [u[0], u[1], u[2], u[3], u[4], 0.0])
     }
 
-    /// As [`Emitters::emit`], but half of the rays head for `targets`: bounding spheres (centre, radius in m > 0) of
-    /// what the caller wants to hit.
+    /// As [`Emitters::emit`], but half of the rays head for `targets`: bounding spheres of what the caller wants to hit.
     ///
     /// Unbiased for light that misses them too: a mixture of both ways of drawing, weighed by the density of the
     /// mixture (Veach's balance heuristic for one sample; Veach and Guibas, SIGGRAPH 1995).
-    pub fn emit_toward(&self, scene: &Scene, targets: &[(Vec3, f32)], u: [f32; 6]) -> Option<Emission> {
+    pub fn emit_toward(&self, scene: &Scene, targets: &[Target], u: [f32; 6]) -> Option<Emission> {
         let light = self.power_sums.partition_point(|&s| s <= u[0]).clamp(1, self.lights.len().max(1)) - 1;
         let kind = self.lights.get(light)?;
         let probability = self.power_sums[light + 1] - self.power_sums[light];
         let start = Start { emitters: self, targets, u: u[5], probability };
         let (a, b) = ([u[1], u[2]], [u[3], u[4]]);
         let mut range = f32::INFINITY;
-        let (ray, flux) = match kind {
+        let (ray, flux, target) = match kind {
             EmitterKind::Polygon(shape) => start.leave_polygon(shape, a, b, |_| shape.radiance)?,
             EmitterKind::Textured(shape) => start.leave_polygon(shape, a, b, |(point, d)| {
                 shone_at(scene, &hit_at(scene, shape.triangles[0], point, 0.0), d.dot(shape.normal) > 0.0)
@@ -89,7 +104,7 @@ impl Emitters {
             }
         };
         let usable = flux.is_finite() && flux.max_channel() > 0.0;
-        usable.then_some(Emission { ray, flux, light: light as u32, range })
+        usable.then_some(Emission { ray, flux, light: light as u32, range, target })
     }
 }
 
@@ -101,18 +116,18 @@ impl Start<'_> {
         a: [f32; 2],
         b: [f32; 2],
         radiance: impl Fn((Vec3, Vec3)) -> Rgb,
-    ) -> Option<(Ray, Rgb)> {
+    ) -> Option<Way> {
         let point = shape.point(a);
         let sides = if shape.two_sided { 2.0 } else { 1.0 };
         let plain = |d: Vec3| {
             let cos = d.dot(shape.normal);
             (if shape.two_sided { cos.abs() } else { cos.max(0.0) }) * FRAC_1_PI / sides
         };
-        let (d, ratio) = self.direction(point, b, || shape.direction(b), plain)?;
+        let (d, ratio, target) = self.direction(point, b, || shape.direction(b), plain)?;
         let cos = d.dot(shape.normal);
         let flux = radiance((point, d)) * (PI * shape.area * sides * ratio / self.probability);
         let ray = Ray::new(offset_origin(point, shape.normal * cos.signum()), d);
-        Some((ray, flux))
+        Some((ray, flux, target))
     }
 
     /// From a point, even within the cone of cosine `cos_outer` around `axis`.
@@ -123,7 +138,7 @@ impl Start<'_> {
         axis: Vec3,
         cos_outer: f32,
         b: [f32; 2],
-    ) -> Option<(Ray, Rgb)> {
+    ) -> Option<Way> {
         let solid_angle = TAU * (1.0 - cos_outer);
         let plain = |d: Vec3| if d.dot(axis) >= cos_outer - 1e-6 { 1.0 / solid_angle } else { 0.0 };
         let draw = || to_world(sampling::cone(Vec2::from(b), cos_outer), axis);
@@ -138,14 +153,14 @@ impl Start<'_> {
         b: [f32; 2],
         draw: impl Fn() -> Vec3,
         plain: impl Fn(Vec3) -> f32,
-    ) -> Option<(Ray, Rgb)> {
-        let (d, ratio) = self.direction(position, b, draw, &plain)?;
+    ) -> Option<Way> {
+        let (d, ratio, target) = self.direction(position, b, draw, &plain)?;
         let weight = lamp.relative(d) * ratio / (plain(d) * self.probability);
-        weight.is_finite().then(|| (Ray::new(position, d), lamp.intensity * weight))
+        weight.is_finite().then(|| (Ray::new(position, d), lamp.intensity * weight, target))
     }
 
     /// Along `d` from a disc outside the scene, with the irradiance (lx) across it.
-    fn come_from_afar(&self, d: Vec3, a: [f32; 2], irradiance: Rgb) -> Option<(Ray, Rgb)> {
+    fn come_from_afar(&self, d: Vec3, a: [f32; 2], irradiance: Rgb) -> Option<Way> {
         let Emitters { centre, radius, .. } = *self.emitters;
         if radius <= 0.0 {
             return None;
@@ -155,59 +170,62 @@ impl Start<'_> {
             let p = sampling::disc(Vec2::from(a)) * radius;
             centre + s * p.x + t * p.y
         };
-        let within =
-            |x: Vec3, (c, r): (Vec3, f32)| (x - c).reject_from_normalized(d).length_squared() <= r * r;
+        let within = |x: Vec3, c: Vec3, r: f32| (x - c).reject_from_normalized(d).length_squared() <= r * r;
         let disc = PI * radius * radius;
         // A hair wider than the draw, lest rounding puts its rim outside.
-        let plain = |x: Vec3| if within(x, (centre, radius * 1.0001)) { 1.0 / disc } else { 0.0 };
-        let total: f32 = self.targets.iter().map(|t| PI * t.1 * t.1).sum();
-        let (x, ratio) = if self.targets.is_empty() {
-            (on_disc(centre, radius), 1.0)
-        } else {
-            let (c, r) = self.guided(|t| PI * t.1 * t.1, total).unwrap_or((centre, radius));
-            let x = on_disc(c, r);
-            let over = self.targets.iter().filter(|t| within(x, **t)).count();
-            (x, plain(x) / (UNGUIDED * plain(x) + (1.0 - UNGUIDED) * over as f32 / total))
-        };
+        let plain = |x: Vec3| if within(x, centre, radius * 1.0001) { 1.0 / disc } else { 0.0 };
+        let of = |t: &Target| t.weight * PI * t.radius * t.radius;
+        let total: f32 = self.targets.iter().map(of).sum();
+        let target = self.guided(of, total);
+        let (c, r) = target.map_or((centre, radius), |k| (self.targets[k].centre, self.targets[k].radius));
+        let x = on_disc(c, r);
+        let over = |t: &&Target| within(x, t.centre, t.radius);
+        let ratio = self.ratio(plain(x), over, total);
         // To a plane in front of the whole scene.
         let back = (x - centre).dot(d) + 1.01 * radius;
-        (ratio > 0.0).then(|| (Ray::new(x - d * back, d), irradiance * (disc * ratio / self.probability)))
+        let flux = irradiance * (disc * ratio / self.probability);
+        (ratio > 0.0).then(|| (Ray::new(x - d * back, d), flux, target))
     }
 
-    /// A direction from `from`, and its plain density over that of the mixture.
+    /// A direction from `from`, its plain density over that of the mixture, and its target.
     fn direction(
         &self,
         from: Vec3,
         b: [f32; 2],
         unguided: impl Fn() -> Vec3,
         plain: impl Fn(Vec3) -> f32,
-    ) -> Option<(Vec3, f32)> {
-        if self.targets.is_empty() {
-            return Some((unguided(), 1.0));
-        }
-        let total: f32 = self.targets.iter().map(|t| Cone::around(from, *t).solid_angle).sum();
-        let d = match self.guided(|t| Cone::around(from, t).solid_angle, total) {
+    ) -> Option<(Vec3, f32, Option<usize>)> {
+        let of = |t: &Target| t.weight * Cone::around(from, t).solid_angle;
+        let total: f32 = self.targets.iter().map(of).sum();
+        let target = self.guided(of, total);
+        let d = match target {
             None => unguided(),
-            Some(target) => Cone::around(from, target).sample(b),
+            Some(k) => Cone::around(from, &self.targets[k]).sample(b),
         };
-        let over = self.targets.iter().filter(|t| Cone::around(from, **t).contains(d)).count();
-        let ratio = plain(d) / (UNGUIDED * plain(d) + (1.0 - UNGUIDED) * over as f32 / total);
-        (ratio > 0.0 && ratio.is_finite()).then_some((d, ratio))
+        let ratio = self.ratio(plain(d), |t| Cone::around(from, t).contains(d), total);
+        (ratio > 0.0 && ratio.is_finite()).then_some((d, ratio, target))
+    }
+
+    /// The `plain` density of a draw over that of the mixture; `over`: whether it is within a target.
+    fn ratio(&self, plain: f32, over: impl Fn(&&Target) -> bool, total: f32) -> f32 {
+        if self.targets.is_empty() {
+            return 1.0;
+        }
+        let guided = self.targets.iter().filter(over).map(|t| t.weight).sum::<f32>() / total;
+        plain / (UNGUIDED * plain + (1.0 - UNGUIDED) * guided)
     }
 
     /// `None` for an unguided draw, else a target in proportion to `weight`, which sums to `total`.
-    fn guided(&self, weight: impl Fn((Vec3, f32)) -> f32, total: f32) -> Option<(Vec3, f32)> {
-        if self.u < UNGUIDED {
+    fn guided(&self, weight: impl Fn(&Target) -> f32, total: f32) -> Option<usize> {
+        if self.u < UNGUIDED || self.targets.is_empty() {
             return None;
         }
         let mut left = (self.u - UNGUIDED) / (1.0 - UNGUIDED) * total;
-        for &t in self.targets {
+        let chosen = self.targets.iter().position(|t| {
             left -= weight(t);
-            if left < 0.0 {
-                return Some(t);
-            }
-        }
-        self.targets.last().copied()
+            left < 0.0
+        });
+        Some(chosen.unwrap_or(self.targets.len() - 1))
     }
 }
 
@@ -222,7 +240,7 @@ struct Cone {
 
 impl Cone {
     /// From `from`; all directions from within the sphere.
-    fn around(from: Vec3, (centre, radius): (Vec3, f32)) -> Cone {
+    fn around(from: Vec3, &Target { centre, radius, .. }: &Target) -> Cone {
         let way = centre - from;
         let d2 = way.length_squared();
         let sin2 = radius * radius / d2;
@@ -283,17 +301,17 @@ mod tests {
         let scene = scene();
         let emitters = Emitters::build(&scene);
         let whole: f32 = emitters.power().iter().map(|p| p.g).sum();
-        let ball = (Vec3::new(0.4, 1.2, -0.3), 0.12f32);
-        let targets = [ball, (Vec3::new(0.2, 1.45, 0.1), 0.2)];
+        let ball = Target { centre: Vec3::new(0.4, 1.2, -0.3), radius: 0.12, weight: 3.0 };
+        let targets = [ball, Target { centre: Vec3::new(0.2, 1.45, 0.1), radius: 0.2, weight: 0.7 }];
         let n = 400_000;
-        let tally = |targets: &[(Vec3, f32)]| {
+        let tally = |targets: &[Target]| {
             let (mut all, mut near) = (0f64, 0f64);
             for e in points(n).filter_map(|u| emitters.emit_toward(&scene, targets, u)) {
                 assert!((e.ray.direction.length() - 1.0).abs() < 1e-4);
-                let way = ball.0 - e.ray.origin;
+                let way = ball.centre - e.ray.origin;
                 let flux = (e.flux.g / n as f32) as f64;
                 all += flux;
-                let close = way.reject_from_normalized(e.ray.direction).length() < ball.1;
+                let close = way.reject_from_normalized(e.ray.direction).length() < ball.radius;
                 near += if close && way.dot(e.ray.direction) > 0.0 { flux } else { 0.0 };
             }
             (all as f32, near as f32)

@@ -14,7 +14,7 @@ mod testing;
 mod tree;
 
 pub use area::{PolygonLight, Seen};
-pub use emit::Emission;
+pub use emit::{Emission, Target};
 pub use group::Group;
 pub use merge::MAX_CORNERS;
 pub use punctual::{range_window, spot_falloff};

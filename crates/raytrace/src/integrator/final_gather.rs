@@ -15,6 +15,10 @@ const FEWEST: f32 = 16.0;
 const LEAST: f32 = 0.125;
 /// Standard deviations of a ray by the light there is that are believed: a site's own rays are poor witnesses.
 const SPREAD: [f32; 2] = [0.5, 2.0];
+/// Rays of a gather at least that one of many samples of a pixel makes.
+const HANDFUL: u32 = 4;
+/// Chance at least that it makes one: the smaller, the more what it finds is multiplied by.
+const CHANCE: f32 = 0.0625;
 /// Rungs of the ladder: half as many rays on each as on the one before.
 const RUNGS: usize = 8;
 /// Of the mean light, what is seen beside all.
@@ -27,12 +31,24 @@ const RAYS: f32 = 0.5;
 #[derive(Clone, Debug)]
 pub struct FinalGather {
     ladder: [Lattice2; RUNGS],
+    handful: Lattice2,
     /// Rays for a surface that the mesh knows nothing of, whose rays are as far apart as there is light.
     full: f32,
     /// Relative error of the mesh up to which it is believed.
     believed: f32,
     /// What is seen beside all light, lx.
     floor: f32,
+}
+
+/// What one of many samples takes over of a gather.
+#[derive(Clone, Copy, Debug)]
+pub struct Share<'a> {
+    /// Its rays.
+    pub rays: &'a Lattice2,
+    /// Chance that it sends them, (0, 1].
+    pub chance: f32,
+    /// Rays of all of them together.
+    pub all: u32,
 }
 
 /// What a surface gathered.
@@ -58,7 +74,8 @@ impl FinalGather {
     /// - `level`: mean indirect irradiance in the scene, lx.
     pub fn new(rays: u32, believed: f32, level: f32) -> FinalGather {
         let ladder = std::array::from_fn(|k| Lattice2::new((2 * rays) >> k));
-        FinalGather { ladder, full: rays as f32, believed, floor: FLOOR * level }
+        let handful = Lattice2::new(HANDFUL);
+        FinalGather { ladder, handful, full: rays as f32, believed, floor: FLOOR * level }
     }
 
     /// The rays that a gather takes where the mesh is in `doubt`; none where it is not worth it.
@@ -66,11 +83,27 @@ impl FinalGather {
     /// - `light`: irradiance that the error is seen beside, lx.
     /// - `part`: share of the pixel that the surface fills, (0, 1].
     pub fn rays(&self, doubt: Doubt, light: f32, part: f32) -> Option<&Lattice2> {
+        self.wanted(doubt, light, part).map(|wanted| self.rung(wanted))
+    }
+
+    /// The same for one of `times` samples that a pixel takes of such surfaces, each seen by itself.
+    pub fn some_rays(&self, doubt: Doubt, light: f32, part: f32, times: u32) -> Option<Share<'_>> {
+        let all = self.wanted(doubt, light, part)?;
+        let rays = all / times.max(1) as f32;
+        let few = rays < HANDFUL as f32;
+        Some(Share {
+            rays: if few { &self.handful } else { self.rung(rays) },
+            chance: if few { (rays / HANDFUL as f32).max(CHANCE) } else { 1.0 },
+            all: all.max(1.0) as u32,
+        })
+    }
+
+    fn wanted(&self, doubt: Doubt, light: f32, part: f32) -> Option<f32> {
         let light = (light + self.floor).max(1e-30);
         let spread = (doubt.ray.sqrt() / light).clamp(SPREAD[0], SPREAD[1]);
         let unsure = (doubt.mesh / (light * light)).max(1e-12);
         let wanted = part * spread * self.full * (1.0 - self.believed * self.believed / unsure);
-        (wanted >= FEWEST.min(LEAST * self.full)).then(|| self.rung(wanted))
+        (wanted >= FEWEST.min(LEAST * self.full)).then_some(wanted)
     }
 
     /// The full number for `part` of a pixel.
@@ -110,6 +143,21 @@ mod tests {
         assert_eq!(rays(f32::INFINITY, 100.0, 1.0, 1.0), Some(256), "twice at most");
         assert_eq!(rays(0.0, 0.0, 0.0, 1.0), None, "no light, no doubt");
         assert_eq!(gather.all_rays(1.0).len(), 128);
+    }
+
+    #[test]
+    fn many_samples_share_one_gather() {
+        let gather = FinalGather::new(128, 0.05, 0.0);
+        let doubt = Doubt { mesh: f32::INFINITY, ray: 1.0 };
+        for times in [1, 4, 16, 64, 256] {
+            let share = gather.some_rays(doubt, 1.0, 1.0, times).expect("worth it");
+            let sent = share.rays.len() as f32 * share.chance * times as f32;
+            assert!((sent / 128.0 - 1.0).abs() < 0.01, "{times} times: {sent}");
+            assert_eq!(share.all, 128);
+        }
+        let share = gather.some_rays(doubt, 1.0, 1.0, 16_384).expect("worth it");
+        assert_eq!((share.rays.len(), share.chance), (HANDFUL, CHANCE), "never by a thousandth of a chance");
+        assert!(gather.some_rays(Doubt { mesh: 0.05 * 0.05, ray: 1.0 }, 1.0, 1.0, 4).is_none());
     }
 
     #[test]
