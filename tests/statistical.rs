@@ -6,7 +6,7 @@ use geometry::sampling::Rng;
 use geometry::{Rgb, Vec3, World};
 use radiosity::Config;
 use radiosity::caustic::Caustics;
-use radiosity::element::{Elements, Side};
+use radiosity::element::Side;
 use raytrace::integrator::path::{Aid, aided_radiance, radiance};
 use raytrace::{DiffuseMode, Film, Settings};
 use support::blocks::ALARM;
@@ -90,7 +90,7 @@ fn aided_paths_have_the_mean_of_plain_ones() {
         .level(2.0, [-0.6, -0.6], [0.6, 0.6], false, &lamp(10.0))
         .quad(mirror, &metal(0.9, 0.0))
         .world();
-    let caustics = Caustics::trace(&world, &Elements::new(&world.scene.mesh), 1_000_000, 1);
+    let caustics = Caustics::trace(&world, 1_000_000, 1);
     let eye = camera(c(-0.2, 1.0, 0.0), c(-0.2, 0.0, 0.001), 0.5);
     let mean = |aided: bool| {
         const PATHS: u32 = 200_000;

@@ -33,6 +33,8 @@ const MATTERS: f32 = 0.05;
 /// So many of the rays that gathering took they may take in any case: of a sun most light falls outside, and the little that
 /// chairs of steel throw about a room is much of what is seen there.
 const CHEAP: f32 = 0.1;
+/// Photons for each particle for which the numbers of particles are made.
+const LANDS: f32 = 0.2;
 /// Surfaces a particle meets at most.
 const LONGEST: usize = 32;
 /// Photons kept at most (56 bytes each).
@@ -126,6 +128,9 @@ impl Caustics {
             let cheap = if flux > 0.0 { CHEAP * gathered as f32 / each.max(1.0) } else { 0.0 };
             let share = (flux / (MATTERS * power).max(1e-30)).min(1.0);
             let wanted = (particles as f32 * share).max(cheap.min(particles as f32));
+            // Where most land, fewer do.
+            let landed: usize = sent.iter().map(|batch| batch.landed.len()).sum();
+            let wanted = wanted * (LANDS * fates.len() as f32 / landed.max(1) as f32).min(1.0);
             targets::weigh(&mut targets, &fates);
             sent = batches(&targets, pilot..pilot + (wanted as usize / BATCH).max(pilot));
         }

@@ -111,6 +111,8 @@ pub(crate) const MOST_SAMPLES: u32 = 16_384;
 const MOST_REPAIRS: u32 = 2;
 /// No repair asks for less of the error than this share.
 const SMALLEST_STEP: f32 = 0.5;
+/// A repair that left more than this share of the error it was to mend is the last: the same again would not help.
+const HELPED: f64 = 0.85;
 /// An error is missed by so much more than it seems, for the next step is not known exactly.
 const MARGIN: f32 = 0.8;
 /// Rays for the probes at most: so many, and this share of what both passes took.
@@ -273,7 +275,7 @@ fn two_passes(
     // Classical meshes know no error, and who sets the number of rays gets that number.
     let fixed = settings.classical.is_some() || settings.samples.is_some() || settings.gather_rays.is_some();
     let most_repairs = if fixed { 0 } else { MOST_REPAIRS };
-    let (mut probes, mut repairs) = (None, 0);
+    let (mut probes, mut repairs, mut missed_by) = (None, 0, f64::INFINITY);
     // The best whole picture so far: a repair that is cut off is no better.
     let mut whole: Option<Outcome> = None;
     loop {
@@ -313,10 +315,12 @@ fn two_passes(
             let outcome = Outcome { film, by_light: Vec::new(), finished, report };
             if let Some(verdict) = verdict.filter(|v| v.judgement() == Judgement::Missed)
                 && repairs < most_repairs
+                && verdict.error < HELPED * missed_by
                 && watch.has_time_for(clock.total())
                 && (!settings.keep_solution || noisy(verdict))
             {
                 repairs += 1;
+                missed_by = verdict.error;
                 whole = Some(outcome);
                 // Half of the error costs about five times as much: no more than that at once.
                 let step = (MARGIN * (verdict.asked / verdict.error) as f32).max(SMALLEST_STEP);
