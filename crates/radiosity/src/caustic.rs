@@ -103,12 +103,18 @@ impl Caustics {
         if targets.is_empty() || world.emitters.is_empty() {
             return Caustics::default();
         }
+        let all = particles.div_ceil(BATCH);
+        let pilot = PILOT.min(all);
         let batches = |targets: &[Target], which: std::ops::Range<usize>| -> Vec<Batch> {
             let send_batch = |batch: usize| {
                 let mut sent = Batch::default();
                 for i in 0..BATCH {
                     let mut rng = Rng::new(seed ^ 0x7068_6f74_6f6e, (batch * BATCH + i) as u64);
-                    sent.send(world, targets, groups, &mut rng);
+                    let fate = sent.send(world, targets, groups, &mut rng);
+                    // Of all of them they would be 24 bytes for each of millions.
+                    if batch < pilot {
+                        sent.fates.push(fate);
+                    }
                 }
                 sent
             };
@@ -116,8 +122,6 @@ impl Caustics {
         };
         // A pilot tells what share of all light comes this way; a small share may be blurred more for the same error.
         // It also tells by way of what, and is forgotten when others have been sent there.
-        let all = particles.div_ceil(BATCH);
-        let pilot = PILOT.min(all);
         let mut sent = batches(&targets, 0..pilot);
         if all > pilot {
             let fates: Vec<Fate> = sent.iter().flat_map(|batch| batch.fates.iter().copied()).collect();
@@ -334,20 +338,26 @@ impl Caustics {
 #[derive(Default)]
 struct Batch {
     landed: Vec<Photon>,
-    /// Of each particle.
+    /// Of each particle of a pilot.
     fates: Vec<Fate>,
     rays: usize,
 }
 
 impl Batch {
     /// Sends one particle more.
-    fn send(&mut self, world: &World, targets: &[Target], groups: Option<&LightGroups>, rng: &mut Rng) {
-        let (mut fate, before) = ((None, 0.0), self.landed.len());
-        if let Some(start) = world.emitters.emit_toward(&world.scene, targets, rng.array()) {
-            self.rays += follow(world, start, groups, rng, &mut self.landed);
-            fate = (start.target, self.landed[before..].iter().map(|p| p.flux.luminance()).sum());
-        }
-        self.fates.push(fate);
+    fn send(
+        &mut self,
+        world: &World,
+        targets: &[Target],
+        groups: Option<&LightGroups>,
+        rng: &mut Rng,
+    ) -> Fate {
+        let Some(start) = world.emitters.emit_toward(&world.scene, targets, rng.array()) else {
+            return (None, 0.0);
+        };
+        let before = self.landed.len();
+        self.rays += follow(world, start, groups, rng, &mut self.landed);
+        (start.target, self.landed[before..].iter().map(|p| p.flux.luminance()).sum())
     }
 }
 
