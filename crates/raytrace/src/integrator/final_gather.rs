@@ -15,12 +15,8 @@ const FEWEST: f32 = 16.0;
 const LEAST: f32 = 0.125;
 /// Standard deviations of a ray by the light there is that are believed: a site's own rays are poor witnesses.
 const SPREAD: [f32; 2] = [0.5, 2.0];
-/// Rays of a gather at least that one of many samples of a pixel makes.
-const HANDFUL: u32 = 4;
-/// Chance at least that it makes one: the smaller, the more what it finds is multiplied by.
-const CHANCE: f32 = 0.0625;
 /// Rungs of the ladder: half as many rays on each as on the one before.
-const RUNGS: usize = 8;
+const RUNGS: usize = 12;
 /// Of the mean light, what is seen beside all.
 const FLOOR: f32 = 0.1;
 /// Full number of rays times the square of the error asked: half of it is left of a lattice of independent rays whose
@@ -31,24 +27,12 @@ const RAYS: f32 = 0.5;
 #[derive(Clone, Debug)]
 pub struct FinalGather {
     ladder: [Lattice2; RUNGS],
-    handful: Lattice2,
     /// Rays for a surface that the mesh knows nothing of, whose rays are as far apart as there is light.
     full: f32,
     /// Relative error of the mesh up to which it is believed.
     believed: f32,
     /// What is seen beside all light, lx.
     floor: f32,
-}
-
-/// What one of many samples takes over of a gather.
-#[derive(Clone, Copy, Debug)]
-pub struct Share<'a> {
-    /// Its rays.
-    pub rays: &'a Lattice2,
-    /// Chance that it sends them, (0, 1].
-    pub chance: f32,
-    /// Rays of all of them together.
-    pub all: u32,
 }
 
 /// What a surface gathered.
@@ -73,9 +57,8 @@ impl FinalGather {
     /// - `believed`: relative error of the mesh that is let be.
     /// - `level`: mean indirect irradiance in the scene, lx.
     pub fn new(rays: u32, believed: f32, level: f32) -> FinalGather {
-        let ladder = std::array::from_fn(|k| Lattice2::new((2 * rays) >> k));
-        let handful = Lattice2::new(HANDFUL);
-        FinalGather { ladder, handful, full: rays as f32, believed, floor: FLOOR * level }
+        let ladder = std::array::from_fn(|k| Lattice2::new(((2 * rays) >> k).max(1)));
+        FinalGather { ladder, full: rays as f32, believed, floor: FLOOR * level }
     }
 
     /// The rays that a gather takes where the mesh is in `doubt`; none where it is not worth it.
@@ -86,16 +69,11 @@ impl FinalGather {
         self.wanted(doubt, light, part).map(|wanted| self.rung(wanted))
     }
 
-    /// The same for one of `times` samples that a pixel takes of such surfaces, each seen by itself.
-    pub fn some_rays(&self, doubt: Doubt, light: f32, part: f32, times: u32) -> Option<Share<'_>> {
-        let all = self.wanted(doubt, light, part)?;
-        let rays = all / times.max(1) as f32;
-        let few = rays < HANDFUL as f32;
-        Some(Share {
-            rays: if few { &self.handful } else { self.rung(rays) },
-            chance: if few { (rays / HANDFUL as f32).max(CHANCE) } else { 1.0 },
-            all: all.max(1.0) as u32,
-        })
+    /// The same for one of `times` samples that a pixel takes of such surfaces, each seen by itself: its share, one ray at
+    /// least, and how many all of them send together.
+    pub fn some_rays(&self, doubt: Doubt, light: f32, part: f32, times: u32) -> Option<(&Lattice2, u32)> {
+        let rays = self.rung(self.wanted(doubt, light, part)? / times.max(1) as f32);
+        Some((rays, rays.len() * times.max(1)))
     }
 
     fn wanted(&self, doubt: Doubt, light: f32, part: f32) -> Option<f32> {
@@ -149,14 +127,9 @@ mod tests {
     fn many_samples_share_one_gather() {
         let gather = FinalGather::new(128, 0.05, 0.0);
         let doubt = Doubt { mesh: f32::INFINITY, ray: 1.0 };
-        for times in [1, 4, 16, 64, 256] {
-            let share = gather.some_rays(doubt, 1.0, 1.0, times).expect("worth it");
-            let sent = share.rays.len() as f32 * share.chance * times as f32;
-            assert!((sent / 128.0 - 1.0).abs() < 0.01, "{times} times: {sent}");
-            assert_eq!(share.all, 128);
-        }
-        let share = gather.some_rays(doubt, 1.0, 1.0, 16_384).expect("worth it");
-        assert_eq!((share.rays.len(), share.chance), (HANDFUL, CHANCE), "never by a thousandth of a chance");
+        let rays = |times| gather.some_rays(doubt, 1.0, 1.0, times).map(|(rays, all)| (rays.len(), all));
+        assert_eq!([1, 4, 64].map(rays), [Some((128, 128)), Some((32, 128)), Some((2, 128))]);
+        assert_eq!(rays(1024), Some((1, 1024)), "no less than a ray");
         assert!(gather.some_rays(Doubt { mesh: 0.05 * 0.05, ray: 1.0 }, 1.0, 1.0, 4).is_none());
     }
 

@@ -45,7 +45,7 @@ const FINE: f32 = 0.01;
 const UNSURE: f32 = 0.2;
 
 /// The same for what is seen in gloss, where what is wrong with the mesh is blurred, and gathers are many. At half of it the
-/// image of a classroom with steel chairs takes half as long again and is 8.3 % off instead of 8.6.
+/// image of a classroom with steel chairs took half as long again and was 8.3 % off instead of 8.6.
 const UNSURE_IN_GLOSS: f32 = 0.4;
 
 /// How much to spend on one surface.
@@ -214,11 +214,9 @@ impl Hybrid<'_> {
             }
             (_, Gather::Shared { part, times, unless }) => {
                 if doubt.mesh > (unless * light).powi(2)
-                    && let Some(share) = self.gathers.some_rays(doubt, light, part, times)
-                    && rng.f32() < share.chance
+                    && let Some((rays, all)) = self.gathers.some_rays(doubt, light, part, times)
                 {
-                    let gathered = self.gather(surface, share.rays, rng);
-                    e += (gathered.e - e) * (trust(doubt, share.all) / share.chance);
+                    e += (self.gather(surface, rays, rng).e - e) * trust(doubt, all);
                 }
                 None
             }
