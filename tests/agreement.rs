@@ -10,10 +10,10 @@ use radiosity::Config;
 use raytrace::{Film, Settings};
 use std::sync::OnceLock;
 use support::blocks::compare;
-use support::build::{Build, parallel};
+use support::build::{Build, camera, parallel};
 use support::files::{asset, load, shared};
 use support::picture::{hybrid, mean, mean_of, path, range, shoot, shoot_with, solve};
-use support::stuff::matt;
+use support::stuff::{lamp, matt};
 
 /// Cornell box by paths, for several tests: 48 × 48, 256 paths a pixel, standard error of the mean 0.1 %.
 fn cornell() -> &'static (World, Camera, Film) {
@@ -132,6 +132,27 @@ fn fine_print() {
 
 fn print() -> TextureRef {
     TextureRef { texture: 0, uv_set: 0, transform: Affine2::IDENTITY }
+}
+
+/// Close up, a white ball on a white table of two triangles, in a large room: light gathers in the wedge between them, which no
+/// corner of the table's first mesh lies near.
+#[test]
+fn a_white_ball_on_a_white_table() {
+    let (grey, white) = (matt(0.5), matt(0.95));
+    let world = Build::new()
+        .room(Vec3::new(-2.5, -1.0, -2.5), Vec3::new(2.5, 2.0, 2.5), [&grey; 6])
+        .level(0.0, [-0.6, -0.6], [0.6, 0.6], true, &white)
+        .ball(Vec3::new(0.0, 0.0802, 0.0), 0.08, 3, false, |_| white.clone())
+        .quad(
+            [[0.6, 0.3], [-0.6, 0.3], [-0.6, 1.3], [0.6, 1.3]].map(|[x, y]| Vec3::new(x, y, 2.4)),
+            &lamp(20.0),
+        )
+        .world();
+    let eye = camera(Vec3::new(0.0, 0.12, 0.5), Vec3::new(0.0, 0.03, 0.0), 0.4);
+    let two_pass = shoot(&world, &eye, &hybrid(64, 40, 0.05));
+    let c = compare(&two_pass, &shoot(&world, &eye, &path(64, 40, 1024)));
+    println!("a white ball on a white table: {c:?}");
+    assert!(c.agrees(0.02, 0.05), "{c:?}");
 }
 
 /// A mesh of few sites errs and knows where. Asked for half of the light, a picture shows what it says; asked for 2 %, its pixels

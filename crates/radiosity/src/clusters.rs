@@ -60,7 +60,7 @@ impl Clusters {
                 };
                 let (v, d2) =
                     members.iter().map(far).max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))?;
-                (d2.sqrt() > least).then_some((c, v, 2.0 * d2.sqrt() * refiner.radius))
+                (d2.sqrt() > least * refiner.closeness(v)).then_some((c, v, 2.0 * d2.sqrt() * refiner.radius))
             })
             .collect()
     }

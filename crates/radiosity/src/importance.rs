@@ -12,6 +12,9 @@ const LIGHTS: f32 = 0.3;
 const REST: f32 = 0.1;
 /// A part of a surface with fewer points than this on all of it goes by the whole: chance may have left it out.
 const FEW: f32 = 8.0;
+/// An error matters in full where it spreads over so many points, one beside another, that are seen: a twelfth of the
+/// width of a picture.
+const SPAN: f32 = 13.0;
 
 /// A point of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,6 +36,20 @@ pub struct Importance {
     pub points: Vec<Point>,
 }
 
+/// What an error of E matters at one slot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Care {
+    /// (0, 1]: 1 where it is seen.
+    pub(crate) weight: f32,
+    /// Length of surface over which an error matters in full, m: short where cameras come near, infinite where none looks.
+    pub(crate) span: f32,
+}
+
+impl Care {
+    /// Where nothing is known of any camera.
+    pub(crate) const FULL: Care = Care { weight: 1.0, span: f32::INFINITY };
+}
+
 /// Points met: those seen, and those that light.
 type Count = [u32; 2];
 
@@ -44,9 +61,14 @@ fn weight(count: Count) -> f32 {
     }
 }
 
+/// Length over which an error matters in full on `area` (m²) on which there are `count` points.
+fn span(count: Count, area: f32) -> f32 {
+    SPAN * (area / count[0] as f32).sqrt()
+}
+
 impl Importance {
-    /// Weight in (0, 1] of each slot of the mesh: the largest of the leaves around it.
-    pub(crate) fn weights(&self, elements: &Elements) -> Vec<f32> {
+    /// What matters at each slot of the mesh: the most of what the leaves around it say.
+    pub(crate) fn care(&self, elements: &Elements) -> Vec<Care> {
         let index = |node: u32, side: Side| 2 * node as usize + side.index();
         let mut of_node: Vec<Count> = vec![[0; 2]; 2 * elements.nodes.len()];
         let mut of_face: Vec<Count> = vec![[0; 2]; 2 * elements.faces as usize];
@@ -58,10 +80,11 @@ impl Importance {
                 of_node[index(node, point.side)][kind] += 1;
             });
         }
-        let roots = self.root_weights(elements, &of_node, &of_face);
-        let mut weights = vec![0f32; 2 * elements.vertices.len()];
+        let roots = self.of_roots(elements, &of_node, &of_face);
+        let nobody = Care { weight: REST, span: f32::INFINITY };
+        let mut care = vec![Care { weight: 0.0, ..nobody }; 2 * elements.vertices.len()];
         for side in Side::BOTH {
-            let mut of_nodes = vec![REST; elements.nodes.len()];
+            let mut of_nodes = vec![nobody; elements.nodes.len()];
             for (node, &w) in roots.iter().skip(side.index()).step_by(2).enumerate() {
                 of_nodes[node] = w;
             }
@@ -70,42 +93,55 @@ impl Importance {
                 let own = of_nodes[node as usize];
                 let all: u32 = of_node[index(node, side)].iter().sum();
                 for child in elements.nodes[node as usize].children() {
-                    let enough = all as f32 >= FEW;
-                    of_nodes[child as usize] = if enough { weight(of_node[index(child, side)]) } else { own };
+                    let count = of_node[index(child, side)];
+                    let many = count[0] as f32 >= FEW;
+                    of_nodes[child as usize] = Care {
+                        weight: if all as f32 >= FEW { weight(count) } else { own.weight },
+                        span: if many { span(count, area(elements, child)) } else { own.span },
+                    };
                 }
             }
             for leaf in elements.leaves() {
+                let of = of_nodes[leaf as usize];
                 for v in elements.nodes[leaf as usize].vertices {
-                    let w = &mut weights[slot(v, side)];
-                    *w = w.max(of_nodes[leaf as usize]);
+                    let c = &mut care[slot(v, side)];
+                    *c = Care { weight: c.weight.max(of.weight), span: c.span.min(of.span) };
                 }
             }
         }
-        weights
+        care
     }
 
-    /// Weight of each side of each scene triangle: its own points' where its share of the face's should be enough to tell.
-    fn root_weights(&self, elements: &Elements, of_node: &[Count], of_face: &[Count]) -> Vec<f32> {
+    /// What matters on each side of each scene triangle: by its own points where its share of the face's should be enough
+    /// to tell.
+    fn of_roots(&self, elements: &Elements, of_node: &[Count], of_face: &[Count]) -> Vec<Care> {
         let roots = elements.roots;
         let mut areas = vec![0f32; elements.faces as usize];
-        let area = |t: u32| {
-            let [a, b, c] = elements.corners(t);
-            geometry::triangle::area(a, b, c)
-        };
         for t in 0..roots {
             if let Some(face) = elements.face(t) {
-                areas[face as usize] += area(t);
+                areas[face as usize] += area(elements, t);
             }
         }
         let of = |t: u32, side: Side| {
-            let Some(face) = elements.face(t) else { return REST };
+            let Some(face) = elements.face(t) else { return Care { weight: REST, span: f32::INFINITY } };
             let whole = of_face[2 * face as usize + side.index()];
-            let expected = whole.iter().sum::<u32>() as f32 * area(t) / areas[face as usize].max(1e-30);
+            let all = areas[face as usize].max(1e-30);
+            let expected = whole.iter().sum::<u32>() as f32 * area(elements, t) / all;
             let own = of_node[2 * t as usize + side.index()];
-            if expected >= FEW { weight(own) } else { weight(whole) }
+            let many = own[0] as f32 >= FEW;
+            Care {
+                weight: if expected >= FEW { weight(own) } else { weight(whole) },
+                span: if many { span(own, area(elements, t)) } else { span(whole, all) },
+            }
         };
         (0..roots).flat_map(|t| Side::BOTH.map(|side| of(t, side))).collect()
     }
+}
+
+/// Area of a node of the mesh, m².
+fn area(elements: &Elements, node: u32) -> f32 {
+    let [a, b, c] = elements.corners(node);
+    geometry::triangle::area(a, b, c)
 }
 
 #[cfg(test)]
@@ -139,16 +175,20 @@ mod tests {
             }
         }
         let mut importance = Importance { points };
-        let weights = importance.weights(&elements);
-        let at = |x: f32, y: f32| {
+        let care = importance.care(&elements);
+        let slots = |x: f32, y: f32| {
             let near = |v: &usize| elements.vertices[*v].position.distance_squared(Vec3::new(x, y, 0.0));
             let v = (0..elements.vertices.len()).min_by(|a, b| near(a).total_cmp(&near(b))).unwrap();
-            [weights[2 * v], weights[2 * v + 1]]
+            [2 * v, 2 * v + 1]
         };
+        let at = |x: f32, y: f32| slots(x, y).map(|slot| care[slot].weight);
         assert_eq!(at(0.2, 0.3), [1.0, REST]);
         assert_eq!(at(0.95, 0.5), [LIGHTS, REST]);
         assert_eq!(at(0.3, 0.95), [REST, REST]);
+        // Seen points lie a hundredth of a metre apart, in the quarter where there are any.
+        let [seen, behind] = slots(0.2, 0.3).map(|slot| care[slot].span);
+        assert!((seen / (0.01 * SPAN) - 1.0).abs() < 0.15 && behind.is_infinite(), "{seen} {behind}");
         importance.points.reverse();
-        assert_eq!(importance.weights(&elements), weights);
+        assert_eq!(importance.care(&elements), care);
     }
 }

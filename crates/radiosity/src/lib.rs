@@ -28,6 +28,7 @@ mod bytes;
 pub mod caustic;
 pub mod classical;
 mod clusters;
+mod crowded;
 pub mod doubt;
 pub mod element;
 pub mod field;

@@ -9,7 +9,7 @@ use crate::element::{EdgeMarks, Elements, Side, VertexId, slot};
 use crate::field::Field;
 use crate::first_mesh::first_mesh;
 use crate::flags::Flags;
-use crate::importance::Importance;
+use crate::importance::{Care, Importance};
 use crate::journal::Journal;
 use crate::reach::Reach;
 use crate::settle::mean;
@@ -58,8 +58,8 @@ pub(crate) struct Refiner<'a> {
     pub(crate) groups: Option<LightGroups>,
     /// Vertices whose surroundings the mesh does not resolve.
     pub(crate) unresolved: Vec<VertexId>,
-    /// What an error matters at each slot, (0, 1]; empty where all matters alike.
-    weights: Vec<f32>,
+    /// What an error matters at each slot; empty where all matters alike.
+    care: Vec<Care>,
     /// What an error at each slot matters for all the light there is: see [`crate::influence`].
     pub(crate) influence: Vec<f32>,
     /// Longest edge of the first mesh, m.
@@ -121,7 +121,7 @@ impl<'a> Refiner<'a> {
             lit: Vec::new(),
             groups: config.by_light.then(|| LightGroups::new(world)),
             unresolved: Vec::new(),
-            weights: Vec::new(),
+            care: Vec::new(),
             influence: Vec::new(),
             h0,
             h_min,
@@ -152,14 +152,28 @@ impl<'a> Refiner<'a> {
     /// Finds anew what matters, after the mesh was refined.
     pub(crate) fn weigh(&mut self) {
         if let Some(importance) = self.importance {
-            self.weights = importance.weights(&self.elements);
+            self.care = importance.care(&self.elements);
         }
     }
 
     /// What an error at a slot matters: 1 where it is seen, less elsewhere, more where much of the light hangs on it.
     pub(crate) fn weight(&self, slot: usize) -> f32 {
-        let seen = self.weights.get(slot).copied().unwrap_or(1.0);
-        seen.max(self.influence.get(slot).copied().unwrap_or(0.0))
+        self.care(slot).weight.max(self.influence.get(slot).copied().unwrap_or(0.0))
+    }
+
+    fn care(&self, slot: usize) -> Care {
+        self.care.get(slot).copied().unwrap_or(Care::FULL)
+    }
+
+    /// Share of what an error at a slot matters in all that it matters on `length` (m) of surface.
+    fn extent(&self, slot: usize, length: f32) -> f32 {
+        (length / self.h0.min(self.care(slot).span)).min(1.0)
+    }
+
+    /// How much closer than a whole room a slot is looked at, (0, 1]: all lengths that the mesh keeps to shrink by so much.
+    pub(crate) fn closeness(&self, v: VertexId) -> f32 {
+        let span = Side::BOTH.map(|side| self.care(slot(v, side)).span);
+        (span[0].min(span[1]) / self.h0).min(1.0)
     }
 
     /// Tests and refines until the tolerance, the finest edge, the sites, the rounds or the time run out.
@@ -185,7 +199,14 @@ impl<'a> Refiner<'a> {
             }
             // The first rounds may not use up what later ones need to go deep.
             let room = if round + 1 < self.config.rounds { left / 2 } else { left };
-            let (chosen, kept, members) = self.choose(&edges, clusters.furthest(self, &open), room);
+            let (mut chosen, kept, members) = self.choose(&edges, clusters.furthest(self, &open), room);
+            // What may be looked for where nothing is known to be comes last.
+            let room = room.saturating_sub(chosen.len() + members.len());
+            if room > 0 {
+                let mut crowded = self.crowded();
+                crowded.retain(|edge| edges.binary_search(edge).is_err());
+                chosen.extend(self.choose(&crowded, Vec::new(), room).0);
+            }
             if chosen.is_empty() && members.is_empty() {
                 break;
             }
@@ -210,10 +231,9 @@ impl<'a> Refiner<'a> {
             rough.resize(self.elements.vertices.len(), false);
             let mut failed = vec![false; self.elements.vertices.len()];
             for (test, &[error, rough_error]) in tests.iter().zip(&errors) {
-                let weighed = error * (test.length / self.h0).min(1.0);
                 // What stands on an edge is worth a quarter of the tolerance: the light may be even all the same.
                 failed[test.vertex as usize] =
-                    weighed > self.config.tolerance * if test.parted { 0.25 } else { 1.0 };
+                    error > self.config.tolerance * if test.parted { 0.25 } else { 1.0 };
                 rough[test.vertex as usize] = rough_error > ROUGH;
             }
             edges = self.edges_longer_than(2.0 * self.h_min, |v| failed[v as usize]);
@@ -245,7 +265,12 @@ impl<'a> Refiner<'a> {
             (0..3).map(move |e| (v[e].min(v[(e + 1) % 3]), v[e].max(v[(e + 1) % 3])))
         });
         let all: Vec<_> = edges.collect();
-        all.into_iter().filter(|&(a, b)| self.length(a, b) > 2.0 * self.h_min).collect()
+        all.into_iter().filter(|&(a, b)| self.splittable(a, b)).collect()
+    }
+
+    /// Whether the edge is long enough to be split.
+    pub(crate) fn splittable(&self, a: VertexId, b: VertexId) -> bool {
+        self.length(a, b) > 2.0 * self.h_min * self.closeness(a).min(self.closeness(b))
     }
 
     /// Distance of two vertices, m.
@@ -286,12 +311,14 @@ impl<'a> Refiner<'a> {
         };
         let change = |a: VertexId, b: VertexId| {
             let face = self.elements.vertices[a as usize].face;
+            let length = self.length(a, b);
             Side::BOTH.map(|side| {
                 if !self.reach.alive(face, side) {
                     return 0.0;
                 }
                 let (sa, sb) = (slot(a, side), slot(b, side));
-                let matters = self.weight(sa).max(self.weight(sb));
+                let matters = self.weight(sa).max(self.weight(sb))
+                    * self.extent(sa, length).max(self.extent(sb, length));
                 matters
                     * match (self.field.usable(sa), self.field.usable(sb)) {
                         (true, true) => {
@@ -308,20 +335,20 @@ impl<'a> Refiner<'a> {
                     }
             })
         };
-        let around = |v: VertexId| {
+        let around = |v: VertexId, length: f32| {
             let of = |&side: &Side| {
                 let s = slot(v, side);
                 self.weight(s)
+                    * self.extent(s, length)
                     * promise(self.field.spread_around(s, &self.e), values[s].mean(), lit[s].mean(), s)
             };
             Side::BOTH.iter().filter(|&&side| self.field.usable(slot(v, side))).map(of).fold(0.0, f32::max)
         };
-        let score = |promise: f32, length: f32| promise * (length / self.h0).min(1.0);
         let promises = |s: [f32; 2]| s.map(|s| s > self.config.tolerance);
         let mut all: Vec<([f32; 2], usize)> = edges
             .par_iter()
-            .map(|&(a, b)| change(a, b).map(|promise| score(promise, self.length(a, b))))
-            .chain(members.par_iter().map(|&(_, v, length)| [score(around(v), length); 2]))
+            .map(|&(a, b)| change(a, b))
+            .chain(members.par_iter().map(|&(_, v, length)| [around(v, length); 2]))
             .enumerate()
             .map(|(i, s)| (s, i))
             .filter(|&(s, _)| promises(s).contains(&true))
@@ -354,7 +381,8 @@ impl<'a> Refiner<'a> {
                         (s + values[slot] * k, w + k, n + k * k * self.field.variance(slot))
                     });
                 if weight <= 0.0 {
-                    return [1.0; 2]; // nothing around it speaks for it
+                    // Nothing around it speaks for it.
+                    return [self.extent(slot(test.vertex, side), test.length), 1.0];
                 }
                 let predicted = sum / weight;
                 let difference = (got - predicted).map(f32::abs).mean();
@@ -366,7 +394,8 @@ impl<'a> Refiner<'a> {
                 let lit = lit.fold(here_lit(side), f32::min);
                 let level = (0.5 * (got + predicted).mean() + lit + floor).max(1e-30);
                 let beyond = |noise: f32| (difference * difference - noise).max(0.0).sqrt() / level;
-                [self.weight(slot(test.vertex, side)) * beyond(noise), beyond(STANDS_OUT * noise)]
+                let s = slot(test.vertex, side);
+                [self.weight(s) * self.extent(s, test.length) * beyond(noise), beyond(STANDS_OUT * noise)]
             })
             .fold([0.0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])])
     }
@@ -425,7 +454,8 @@ impl<'a> Refiner<'a> {
         used
     }
 
-    /// Edges of leaves that are longer than `length` and have an end that `wanted` names; each once, in order.
+    /// Edges of leaves that are longer than `length`, less where one looks closely, and have an end that `wanted` names; each
+    /// once, in order.
     fn edges_longer_than(&self, length: f32, wanted: impl Fn(VertexId) -> bool) -> Vec<(VertexId, VertexId)> {
         let mut edges = Vec::new();
         for leaf in self.elements.leaves() {
@@ -438,8 +468,11 @@ impl<'a> Refiner<'a> {
             }
             for e in 0..3 {
                 let (a, b) = (node.vertices[e], node.vertices[(e + 1) % 3]);
-                if (wanted(a) || wanted(b)) && corners[e].distance(corners[(e + 1) % 3]) > length {
-                    edges.push((a.min(b), a.max(b)));
+                if wanted(a) || wanted(b) {
+                    let close = self.closeness(a).min(self.closeness(b));
+                    if corners[e].distance(corners[(e + 1) % 3]) > length * close {
+                        edges.push((a.min(b), a.max(b)));
+                    }
                 }
             }
         }
