@@ -13,7 +13,7 @@ use support::blocks::compare;
 use support::build::{Build, camera, parallel};
 use support::files::{asset, load, shared};
 use support::picture::{hybrid, mean, mean_of, path, range, shoot, shoot_with, solve};
-use support::stuff::{lamp, matt};
+use support::stuff::{lamp, matt, metal};
 
 /// Cornell box by paths, for several tests: 48 × 48, 256 paths a pixel, standard error of the mean 0.1 %.
 fn cornell() -> &'static (World, Camera, Film) {
@@ -153,6 +153,44 @@ fn a_white_ball_on_a_white_table() {
     let c = compare(&two_pass, &shoot(&world, &eye, &path(64, 40, 1024)));
     println!("a white ball on a white table: {c:?}");
     assert!(c.agrees(0.02, 0.05), "{c:?}");
+}
+
+/// Balls of brushed metal, a pixel and a half wide, under a lamp: each shows its highlight on a small part of its side, which
+/// is not where the middle of a pixel meets it.
+#[test]
+fn highlights_smaller_than_a_pixel() {
+    let brushed = metal(0.5, 0.25);
+    let mut build = Build::new().quad(
+        [[-0.3, -0.3], [0.3, -0.3], [0.3, 0.3], [-0.3, 0.3]].map(|[x, z]| Vec3::new(x + 1.0, 1.5, z)),
+        &lamp(20.0),
+    );
+    for k in 0..64 {
+        let (i, j) = ((k % 8) as f32 - 3.5, (k / 8) as f32 - 3.5);
+        build = build.ball(Vec3::new(0.0913 * i, 0.0913 * j, 0.0), 0.015, 3, false, |_| brushed.clone());
+    }
+    let world = build.world();
+    let eye = parallel(Vec3::Z, Vec3::ZERO, 0.4, 0.0);
+    let two_pass = shoot(&world, &eye, &hybrid(40, 40, 0.05));
+    let reference = shoot(&world, &eye, &path(40, 40, 4096));
+    let c = compare(&two_pass, &reference);
+    println!("highlights smaller than a pixel: {c:?}");
+    assert!(c.agrees(0.02, 0.2), "{c:?}");
+}
+
+/// A level bar a third of a pixel thick, which rises by one row from left to right: the middles of most pixels miss it.
+#[test]
+fn a_bar_thinner_than_a_pixel() {
+    let bar = [[-1.0, 0.011], [-1.0, -0.005], [1.0, 0.035], [1.0, 0.051]];
+    let world = Build::new()
+        .quad(bar.map(|[x, y]| Vec3::new(x, y, 0.0)), &matt(0.8))
+        .point_lamp(Vec3::new(0.0, 0.0, 2.0), 100.0)
+        .world();
+    let eye = parallel(Vec3::Z, Vec3::ZERO, 1.0, 0.0);
+    let two_pass = shoot(&world, &eye, &hybrid(40, 40, 0.05));
+    let reference = shoot(&world, &eye, &path(40, 40, 1024));
+    let c = compare(&two_pass, &reference);
+    println!("a bar thinner than a pixel: {c:?}");
+    assert!(c.agrees(0.02, 0.1) && c.rms < 0.02, "{c:?}");
 }
 
 /// A mesh of few sites errs and knows where. Asked for half of the light, a picture shows what it says; asked for 2 %, its pixels

@@ -3,11 +3,13 @@
 use crate::effort::{self, Budget, Noise};
 use crate::film::Film;
 use crate::integrator::hybrid::Hybrid;
-use crate::pixel::{Effort, Shot, View, over_pixels, shade};
+use crate::pixel::{Effort, Shot, View, over_pixels, parts, shade};
 use radiosity::Progress;
 
 /// Every pixel's first effort.
 const FIRST: Effort = Effort { camera: 1, shadow: 4 };
+/// The next effort of a pixel in which another ray meets another surface.
+const EDGE: Effort = Effort { camera: 4, shadow: 4 };
 /// Rounds of refinement at most.
 const MOST_ROUNDS: u32 = 6;
 
@@ -17,12 +19,14 @@ pub(crate) struct Adaptive<'a> {
     view: &'a View<'a>,
     seed: u64,
     shots: Vec<Option<Shot>>,
+    /// Whether slivers were looked for.
+    searched: bool,
 }
 
 impl<'a> Adaptive<'a> {
     /// A picture of which nothing is done yet.
     pub fn new(hybrid: &'a Hybrid<'a>, view: &'a View<'a>, seed: u64) -> Adaptive<'a> {
-        Adaptive { hybrid, view, seed, shots: Vec::new() }
+        Adaptive { hybrid, view, seed, shots: Vec::new(), searched: false }
     }
 
     /// One ray through every pixel; whether all were reached.
@@ -37,30 +41,52 @@ impl<'a> Adaptive<'a> {
 
     /// Does those pixels again that need it, until the noise is within `budget`; whether it came to that.
     pub fn refine(&mut self, budget: &Budget, progress: &dyn Progress) -> bool {
+        if !self.searched && budget.most_camera >= EDGE.camera && !self.find_slivers(progress) {
+            return false;
+        }
         for _ in 0..MOST_ROUNDS {
             let noise = effort::noise(&self.shots, self.view);
             let wanted = effort::next(&self.shots, &noise, budget);
             if wanted.is_empty() {
                 return true;
             }
-            progress.stage("refining", wanted.len() as u64);
-            let which: Vec<u32> = (0..wanted.len() as u32).collect();
-            let again = over_pixels(&which, progress, |k| {
-                let (i, effort) = wanted[k as usize];
-                self.shade(i, effort)
-            });
-            let finished = again.iter().all(Option::is_some);
-            for (&(i, _), shot) in wanted.iter().zip(again) {
-                if shot.is_some() {
-                    self.shots[i as usize] = shot;
-                }
-            }
-            self.show(progress);
-            if !finished {
+            if !self.redo(&wanted, progress) {
                 return false;
             }
         }
         true
+    }
+
+    /// Sends one more ray through every pixel, and does those again where it meets another surface than the first: a rod
+    /// thinner than a pixel may pass between the middles of a whole row of them. Whether all were reached.
+    fn find_slivers(&mut self, progress: &dyn Progress) -> bool {
+        let pixels: Vec<u32> = (0..self.shots.len() as u32).collect();
+        let parted = over_pixels(&pixels, progress, |i| {
+            let shot = self.shots[i as usize].as_ref()?;
+            let (x, y) = (i % self.view.width, i / self.view.width);
+            parts(self.hybrid.world, self.view, x, y, shot).then_some((i, EDGE))
+        });
+        self.searched = parted.iter().all(Option::is_some);
+        let wanted: Vec<(u32, Effort)> = parted.into_iter().flatten().flatten().collect();
+        self.redo(&wanted, progress) && self.searched
+    }
+
+    /// Does the pixels `wanted` again; whether all were reached.
+    fn redo(&mut self, wanted: &[(u32, Effort)], progress: &dyn Progress) -> bool {
+        progress.stage("refining", wanted.len() as u64);
+        let which: Vec<u32> = (0..wanted.len() as u32).collect();
+        let again = over_pixels(&which, progress, |k| {
+            let (i, effort) = wanted[k as usize];
+            self.shade(i, effort)
+        });
+        let finished = again.iter().all(Option::is_some);
+        for (&(i, _), shot) in wanted.iter().zip(again) {
+            if shot.is_some() {
+                self.shots[i as usize] = shot;
+            }
+        }
+        self.show(progress);
+        finished
     }
 
     fn show(&self, progress: &dyn Progress) {

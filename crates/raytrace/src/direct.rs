@@ -24,9 +24,25 @@ pub struct Spend<'a> {
     pub samples: u32,
     /// Place in the 4 × 4 block of pixels, 0 … 15.
     pub phase: u32,
-    /// Points of the surface that shadow rays start from in turn, at least one: the edge of a shadow may run through the
-    /// pixel.
-    pub places: &'a [Vec3],
+    /// Where shadow rays start from in turn, at least one place: the edge of a shadow may run through the pixel.
+    pub places: &'a [Start<'a>],
+}
+
+/// A point of the surface that is lit.
+#[derive(Clone, Copy, Debug)]
+pub struct Start<'a> {
+    /// Where.
+    pub position: Vec3,
+    /// The surface there and the way to the eye, for its gloss: a tube turns its highlight within a pixel. That which is lit
+    /// as a whole if absent.
+    pub seen: Option<(&'a Surface, Vec3)>,
+}
+
+impl Start<'_> {
+    /// A point like all others of the surface.
+    pub fn at(position: Vec3) -> Start<'static> {
+        Start { position, seen: None }
+    }
 }
 
 /// From one place to the next: no divisor of the numbers of places, which are powers of four and less, so that strata of
@@ -211,7 +227,7 @@ impl Part {
         surface: &Surface,
         wo: Vec3,
         s: &LightSample,
-        from: Vec3,
+        from: Start,
         times: f32,
         gloss: Gloss,
         diffuse: bool,
@@ -222,11 +238,14 @@ impl Part {
         let above = cos > 0.0 && s.wi.dot(surface.ng) > 0.0;
         let arriving = if above { s.radiance * (cos / s.pdf) } else { Rgb::BLACK };
         self.open += if cos > 0.0 { s.radiance * (cos / s.pdf) } else { Rgb::BLACK };
-        let f_glossy = if gloss == Gloss::None { Rgb::BLACK } else { surface.bsdf.eval_glossy(wo, s.wi) };
+        let seen = s.seen_from(surface.position, from.position);
+        let (shown, to_eye) = from.seen.unwrap_or((surface, wo));
+        let f_glossy =
+            if gloss == Gloss::None { Rgb::BLACK } else { shown.bsdf.eval_glossy(to_eye, seen.wi) };
         if arriving.is_black() && f_glossy.is_black() {
             return;
         }
-        let open = world.transmittance(&s.seen_from(surface.position, from).shadow_ray(from, surface.ng));
+        let open = world.transmittance(&seen.shadow_ray(from.position, surface.ng));
         if open.is_black() {
             return;
         }
@@ -240,13 +259,14 @@ impl Part {
             let weight = match gloss {
                 Gloss::Shared if !s.delta => {
                     let light = times * s.pdf;
-                    light / (light + surface.bsdf.pdf_specular(wo, s.wi))
+                    light / (light + shown.bsdf.pdf_specular(to_eye, seen.wi))
                 }
                 _ => 1.0,
             };
-            let shown = f_glossy * open * s.radiance * (cos.abs() / s.pdf * weight);
-            self.glossy += shown;
-            self.glossy2 += shown.luminance() * shown.luminance();
+            let cos = seen.wi.dot(shown.ns).abs();
+            let sent = f_glossy * open * s.radiance * (cos / s.pdf * weight);
+            self.glossy += sent;
+            self.glossy2 += sent.luminance() * sent.luminance();
         }
     }
 
@@ -292,14 +312,14 @@ impl Part {
 }
 
 /// The small lights together.
-fn pooled(
+fn pooled<'a>(
     world: &World,
     surface: &Surface,
     wo: Vec3,
     plan: &Plan,
     gloss: Gloss,
     phase: u32,
-    place: &dyn Fn(u32) -> Vec3,
+    place: &dyn Fn(u32) -> Start<'a>,
     rng: &mut Rng,
     out: &mut Direct,
 ) {

@@ -253,7 +253,7 @@ impl Grid<'_> {
         let (mut sum, mut count) = (Noise::default(), 0.0);
         for (nx, ny) in (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (x + dx, y + dy))) {
             let Some(other) = self.at(nx, ny) else { continue };
-            if (nx, ny) != (x, y) && !same_surface(shot, other) {
+            if (nx, ny) != (x, y) && !shot.like(other) {
                 continue;
             }
             let theirs = &own[(ny * self.w + nx) as usize];

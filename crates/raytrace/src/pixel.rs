@@ -1,5 +1,6 @@
 //! One pixel of the hybrid picture: as many rays through it as it needs, each surface they find shaded once.
 
+use crate::direct::Start;
 use crate::film::Pixel;
 use crate::integrator::final_gather::Gathered;
 use crate::integrator::hybrid::{Gather, Hybrid, Photons, Quality};
@@ -64,6 +65,24 @@ impl Key {
         self.material == other.material
             && self.normal.dot(other.normal) > 0.95
             && (other.position - self.position).dot(self.normal).abs() < tolerance
+    }
+
+    /// Whether two points lie on the same material, a few pixels apart at most.
+    fn near(&self, other: &Key) -> bool {
+        let tolerance = 6.0 * self.footprint.max(other.footprint);
+        self.material == other.material && self.position.distance(other.position) < tolerance
+    }
+}
+
+impl Shot {
+    /// Whether what one pixel tells of its noise holds for another too: they see one smooth surface, or near parts of a glossy
+    /// one that is bent (a tube), whose highlight may have been met in one only.
+    pub fn like(&self, other: &Shot) -> bool {
+        match (&self.key, &other.key) {
+            (Some(a), Some(b)) => a.continues(b) || (self.specular && other.specular && a.near(b)),
+            (None, None) => true,
+            _ => false,
+        }
     }
 }
 
@@ -176,6 +195,21 @@ pub fn shade(
     shot
 }
 
+/// Whether another ray through pixel (x, y) meets another surface than that of the first. Along a row and along a column such
+/// rays lie at all heights and widths of their pixels, as evenly as the golden ratio spreads them.
+pub(crate) fn parts(world: &World, view: &View, x: u32, y: u32, shot: &Shot) -> bool {
+    const GOLDEN: f64 = 0.618_033_988_749_895;
+    let [jx, jy] = [2 * x + y, x + 2 * y].map(|k| (GOLDEN * f64::from(k)).fract());
+    let ray = view.ray(x as f32 + jx as f32, y as f32 + jy as f32);
+    match (first_surface(world, ray), &shot.key) {
+        (Some((ray, surface)), Some(key)) => {
+            let depth = surface.position.distance(ray.origin);
+            !key.continues(&Key::new(&surface, view.footprint(depth)))
+        }
+        (found, key) => found.is_some() != key.is_some(),
+    }
+}
+
 /// Calls `pixel` for every index of `which`, in parallel, until stopped; pixels not reached are `None`.
 pub(crate) fn over_pixels<T: Send>(
     which: &[u32],
@@ -269,7 +303,11 @@ fn one_surface(
     // A sliver of a pixel needs fewer shadow rays for the same noise in the pixel.
     let shadow = if part < 0.3 && effort.shadow > 4 { effort.shadow / 4 } else { effort.shadow };
     let quality = Quality { shadow, gather, photons: Photons::Always };
-    let places: Vec<Vec3> = g.hits.iter().map(|&i| hits[i].1.position).collect();
+    let place = |&i: &usize| {
+        let (ray, surface) = &hits[i];
+        Start { position: surface.position, seen: Some((surface, -ray.direction)) }
+    };
+    let places: Vec<Start> = g.hits.iter().map(place).collect();
     let (lit, plan) = hybrid.diffuse(surface, wo, quality, phase, &places, rng);
     let albedo = surface.bsdf.diffuse_albedo(wo);
     let (mean_albedo, coverage) = match textured && g.hits.len() > 1 {

@@ -1,7 +1,7 @@
 //! The light at a point of a surface, whoever looks at it.
 
 use super::Light;
-use crate::direct::{Gloss, Plan, Spend, direct};
+use crate::direct::{Gloss, Plan, Spend, Start, direct};
 use crate::integrator::final_gather::FinalGather;
 use crate::integrator::hybrid::{Diffuse, Gather, Hybrid, Photons, Quality};
 use crate::render::DiffuseMode;
@@ -113,13 +113,21 @@ impl<'a> Lamp<'a> {
         let hybrid = if spot.known { &self.by_vertices } else { &self.by_rays };
         let quality = Quality { shadow: self.shadow, gather: Gather::Worth(1.0), photons: Photons::Always };
         let phase = rng.below(16);
-        hybrid.diffuse(&spot.surface, spot.surface.ng, quality, phase, &[spot.surface.position], rng)
+        hybrid.diffuse(
+            &spot.surface,
+            spot.surface.ng,
+            quality,
+            phase,
+            &[Start::at(spot.surface.position)],
+            rng,
+        )
     }
 
     /// The light of the lamps alone, once more.
     fn straight(&self, spot: &Spot, plan: &Plan, rng: &mut Rng) -> Rgb {
         let (world, surface) = (self.by_vertices.world, &spot.surface);
-        let spend = Spend { samples: self.shadow, phase: rng.below(16), places: &[surface.position] };
+        let spend =
+            Spend { samples: self.shadow, phase: rng.below(16), places: &[Start::at(surface.position)] };
         direct(world, surface, surface.ng, plan, Gloss::None, spend, rng).diffuse
     }
 

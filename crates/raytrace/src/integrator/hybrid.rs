@@ -7,7 +7,7 @@
 
 use super::Layers;
 use super::final_gather::{FinalGather, Gathered, trust};
-use crate::direct::{Direct, Gloss, Plan, Spend, direct};
+use crate::direct::{Direct, Gloss, Plan, Spend, Start, direct};
 use crate::render::DiffuseMode;
 use geometry::bsdf::BsdfSample;
 use geometry::dispersion::Hue;
@@ -136,7 +136,7 @@ impl Hybrid<'_> {
         wo: Vec3,
         quality: Quality,
         phase: u32,
-        places: &[Vec3],
+        places: &[Start],
         rng: &mut Rng,
     ) -> (Diffuse, Plan) {
         let (mut out, plan) = self.diffuse_of_side(surface, wo, quality, phase, places, rng);
@@ -157,7 +157,7 @@ impl Hybrid<'_> {
         wo: Vec3,
         quality: Quality,
         phase: u32,
-        places: &[Vec3],
+        places: &[Start],
         rng: &mut Rng,
     ) -> (Diffuse, Plan) {
         let plan = Plan::new(self.world, surface.position, surface.ns, quality.shadow);
@@ -247,13 +247,13 @@ impl Hybrid<'_> {
     }
 
     /// Mean irradiance by photons over `places`, lx: a few of them where those agree within `tolerance` lx.
-    fn caustic_over(&self, places: &[Vec3], ng: Vec3, tolerance: f32) -> Rgb {
+    fn caustic_over(&self, places: &[Start], ng: Vec3, tolerance: f32) -> Rgb {
         const FEW: usize = 3;
         let spread_out = |n: usize| places.iter().step_by(places.len().div_ceil(n).max(1));
         let mean = |n: usize| {
             let (mut sum, mut count, mut low, mut high) = (Rgb::BLACK, 0.0, f32::INFINITY, 0f32);
-            for &p in spread_out(n) {
-                let e = self.solution.caustics.irradiance(p, ng);
+            for place in spread_out(n) {
+                let e = self.solution.caustics.irradiance(place.position, ng);
                 let y = e.luminance();
                 (sum, count, low, high) = (sum + e, count + 1.0, low.min(y), high.max(y));
             }
@@ -424,8 +424,9 @@ impl Hybrid<'_> {
             false => Gather::Never,
         };
         let phase = (rng.f32() * 16.0) as u32;
+        let here = Start::at(surface.position);
         let (diffuse, plan) =
-            self.diffuse(surface, wo, Quality { shadow, gather, photons }, phase, &[surface.position], rng);
+            self.diffuse(surface, wo, Quality { shadow, gather, photons }, phase, &[here], rng);
         diffuse.direct + diffuse.indirect + diffuse.glossy + self.specular(surface, wo, &plan, strand, rng)
     }
 

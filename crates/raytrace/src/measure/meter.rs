@@ -6,7 +6,7 @@
 //! stand in for them then; in mid-air, where no photon lands, such light is not measured.
 
 use super::Statistics;
-use crate::direct::{Gloss, Plan, Spend, direct};
+use crate::direct::{Gloss, Plan, Spend, Start, direct};
 use geometry::math::{offset_origin, to_world};
 use geometry::sampling::{Lattice2, Rng, cosine_hemisphere};
 use geometry::{Hit, Ray, Rgb, Surface, Vec3, World};
@@ -176,7 +176,7 @@ impl<'a> Meter<'a> {
     /// One estimate, and the number of rays that ran into an emitter by way of mirrors and glass.
     fn estimate(&self, sensor: &Sensor, sheet: &Surface, plan: &Plan, rng: &mut Rng) -> (Reading, u32) {
         let Sensor { position, normal, .. } = *sensor;
-        let spend = Spend { samples: SHADOW_RAYS, phase: rng.below(16), places: &[position] };
+        let spend = Spend { samples: SHADOW_RAYS, phase: rng.below(16), places: &[Start::at(position)] };
         let straight = direct(self.world, sheet, normal, plan, Gloss::None, spend, rng);
         let mut out = Reading { direct: straight.irradiance, ..Reading::default() };
         let mut found = 0;
