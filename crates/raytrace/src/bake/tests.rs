@@ -130,17 +130,24 @@ fn all_light_of_the_solution_is_on_the_baked_mesh() {
 
 #[test]
 fn more_vertices_leave_less_error() {
-    let error = |most| {
-        let settings = Settings { error: 0.01, ..settings(Target::Vertices { most }) };
-        bake(&ROOM.world, &ROOM.solution, &settings, &()).report
-    };
-    let (few, many) = (error(1), error(20_000));
-    assert_eq!(few.error, few.first_error);
-    assert!(few.out_of_vertices);
+    // One bake measures its error to about a half of it: 1.3 to 2.4 % by the seed.
+    let (mut few, mut many) = (0.0, 0.0);
+    for seed in 3..6 {
+        let report = |most| {
+            let settings = Settings { error: 0.01, seed, ..settings(Target::Vertices { most }) };
+            bake(&ROOM.world, &ROOM.solution, &settings, &()).report
+        };
+        let (least, most) = (report(1), report(20_000));
+        assert_eq!(least.error, least.first_error);
+        assert!(least.out_of_vertices && most.vertices > least.vertices);
+        few += least.error.unwrap().powi(2);
+        many += most.error.unwrap().powi(2);
+    }
     // Seven rounds of a fifth more vertices are 3.6 times as many; what is left is at the shadows' edges, where the error
-    // falls as the root of their number: to 0.53. Measured 0.50.
-    assert!(many.error < few.error.map(|e| 0.6 * e), "{:?} → {:?}", few.error, many.error);
-    assert!(many.vertices > few.vertices);
+    // falls as the root of their number: to 0.53.
+    let ratio = (many / few).sqrt();
+    println!("of the error is left {ratio}");
+    assert!(ratio < 0.7, "{ratio}");
 }
 
 #[test]
