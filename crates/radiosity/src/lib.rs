@@ -43,6 +43,7 @@ mod levels;
 mod lights;
 mod neighbours;
 mod noise;
+mod orphans;
 pub mod patch_to_vertex;
 pub mod patches;
 pub mod reach;

@@ -178,6 +178,7 @@ impl<'a> Refiner<'a> {
 
     /// Tests and refines until the tolerance, the finest edge, the sites, the rounds or the time run out.
     pub(crate) fn refine(&mut self) {
+        self.adopt();
         self.settle(true);
         let mut edges = self.edges_longer_than(self.radius.max(2.0 * self.h_min), |_| true);
         let mut clusters = Clusters::new(self);
@@ -242,6 +243,7 @@ impl<'a> Refiner<'a> {
             edges.dedup();
             open = clusters.divide(self, &members, &failed);
         }
+        self.adopt();
         self.reveal();
         self.unresolved = (0..rough.len() as VertexId).filter(|&v| rough[v as usize]).collect();
     }
