@@ -37,10 +37,7 @@ impl Refiner<'_> {
         let mut edges: Vec<_> = crowds
             .map(|rays| (rays[0] / 2, Side::BOTH[rays[0] as usize % 2]))
             .filter(|&(leaf, side)| self.reach.alive(self.elements.face_of(leaf), side))
-            .flat_map(|(leaf, _)| {
-                let v = self.elements.nodes[leaf as usize].vertices;
-                (0..3).map(move |e| (v[e].min(v[(e + 1) % 3]), v[e].max(v[(e + 1) % 3])))
-            })
+            .flat_map(|(leaf, _)| self.elements.edges(leaf))
             .filter(|&(a, b)| self.splittable(a, b))
             .collect();
         edges.sort_unstable();

@@ -13,7 +13,8 @@ const REST: f32 = 0.1;
 /// A part of a surface with fewer points than this on all of it goes by the whole: chance may have left it out.
 const FEW: f32 = 8.0;
 /// An error matters in full where it spreads over so many points, one beside another, that are seen: a twelfth of the
-/// width of a picture.
+/// width of a picture. Furnished rooms looked at as a whole keep the lengths they have without it
+/// (a kitchen gets 31 771 sites, 31 751 without).
 const SPAN: f32 = 13.0;
 
 /// A point of a surface.
@@ -48,6 +49,8 @@ pub(crate) struct Care {
 impl Care {
     /// Where nothing is known of any camera.
     pub(crate) const FULL: Care = Care { weight: 1.0, span: f32::INFINITY };
+    /// Where no camera looks, nor light for one comes from.
+    const NONE: Care = Care { weight: REST, span: f32::INFINITY };
 }
 
 /// Points met: those seen, and those that light.
@@ -81,10 +84,9 @@ impl Importance {
             });
         }
         let roots = self.of_roots(elements, &of_node, &of_face);
-        let nobody = Care { weight: REST, span: f32::INFINITY };
-        let mut care = vec![Care { weight: 0.0, ..nobody }; 2 * elements.vertices.len()];
+        let mut care = vec![Care { weight: 0.0, ..Care::NONE }; 2 * elements.vertices.len()];
         for side in Side::BOTH {
-            let mut of_nodes = vec![nobody; elements.nodes.len()];
+            let mut of_nodes = vec![Care::NONE; elements.nodes.len()];
             for (node, &w) in roots.iter().skip(side.index()).step_by(2).enumerate() {
                 of_nodes[node] = w;
             }
@@ -123,7 +125,7 @@ impl Importance {
             }
         }
         let of = |t: u32, side: Side| {
-            let Some(face) = elements.face(t) else { return Care { weight: REST, span: f32::INFINITY } };
+            let Some(face) = elements.face(t) else { return Care::NONE };
             let whole = of_face[2 * face as usize + side.index()];
             let all = areas[face as usize].max(1e-30);
             let expected = whole.iter().sum::<u32>() as f32 * area(elements, t) / all;

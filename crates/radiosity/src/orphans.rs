@@ -2,7 +2,7 @@
 //! whose frame stands on it. Those that the eye sees are gathered at.
 
 use crate::element::cluster;
-use crate::element::{Side, VertexId, slot};
+use crate::element::{Side, Vertex, VertexId, slot};
 use crate::refine::Refiner;
 
 /// Rounds of looking for them: one may see another.
@@ -36,7 +36,7 @@ impl Refiner<'_> {
         for site in &self.field.sites {
             asked[slot(site.vertex, site.side)] = true;
         }
-        let of = |(v, vertex): (usize, &crate::element::Vertex)| {
+        let of = |(v, vertex): (usize, &Vertex)| {
             Side::BOTH.map(|side| {
                 let s = slot(v as VertexId, side);
                 used[v]

@@ -262,17 +262,19 @@ impl<'a> Refiner<'a> {
         *probed = self.elements.nodes.len() as u32;
         let surprising =
             leaves.into_par_iter().filter(|&leaf| self.surprises(leaf, &values, floor, &pattern));
-        let edges = surprising.flat_map_iter(|leaf| {
-            let v = self.elements.nodes[leaf as usize].vertices;
-            (0..3).map(move |e| (v[e].min(v[(e + 1) % 3]), v[e].max(v[(e + 1) % 3])))
-        });
+        let edges = surprising.flat_map_iter(|leaf| self.elements.edges(leaf));
         let all: Vec<_> = edges.collect();
         all.into_iter().filter(|&(a, b)| self.splittable(a, b)).collect()
     }
 
     /// Whether the edge is long enough to be split.
     pub(crate) fn splittable(&self, a: VertexId, b: VertexId) -> bool {
-        self.length(a, b) > 2.0 * self.h_min * self.closeness(a).min(self.closeness(b))
+        self.longer(a, b, 2.0 * self.h_min)
+    }
+
+    /// Whether an edge is longer than `length` (m), less where one looks closely.
+    fn longer(&self, a: VertexId, b: VertexId, length: f32) -> bool {
+        self.length(a, b) > length * self.closeness(a).min(self.closeness(b))
     }
 
     /// Distance of two vertices, m.
@@ -462,21 +464,14 @@ impl<'a> Refiner<'a> {
         let mut edges = Vec::new();
         for leaf in self.elements.leaves() {
             let node = &self.elements.nodes[leaf as usize];
-            let corners = self.elements.corners(leaf);
             let piece = self.elements.vertices[node.vertices[0] as usize].piece;
             let lit = Side::BOTH.iter().any(|&side| self.reach.alive(self.elements.face_of(leaf), side));
             if !lit || !self.diffuse[piece as usize] {
                 continue;
             }
-            for e in 0..3 {
-                let (a, b) = (node.vertices[e], node.vertices[(e + 1) % 3]);
-                if wanted(a) || wanted(b) {
-                    let close = self.closeness(a).min(self.closeness(b));
-                    if corners[e].distance(corners[(e + 1) % 3]) > length * close {
-                        edges.push((a.min(b), a.max(b)));
-                    }
-                }
-            }
+            let wanted =
+                |&(a, b): &(VertexId, VertexId)| (wanted(a) || wanted(b)) && self.longer(a, b, length);
+            edges.extend(self.elements.edges(leaf).into_iter().filter(wanted));
         }
         edges.sort_unstable();
         edges.dedup();

@@ -3,7 +3,7 @@
 use crate::effort::{self, Budget, Noise};
 use crate::film::Film;
 use crate::integrator::hybrid::Hybrid;
-use crate::pixel::{Effort, Shot, View, over_pixels, parts, shade};
+use crate::pixel::{Effort, Shot, View, meets_another, over_pixels, shade};
 use radiosity::Progress;
 
 /// Every pixel's first effort.
@@ -64,7 +64,7 @@ impl<'a> Adaptive<'a> {
         let parted = over_pixels(&pixels, progress, |i| {
             let shot = self.shots[i as usize].as_ref()?;
             let (x, y) = (i % self.view.width, i / self.view.width);
-            parts(self.hybrid.world, self.view, x, y, shot).then_some((i, EDGE))
+            meets_another(self.hybrid.world, self.view, x, y, shot).then_some((i, EDGE))
         });
         self.searched = parted.iter().all(Option::is_some);
         let wanted: Vec<(u32, Effort)> = parted.into_iter().flatten().flatten().collect();

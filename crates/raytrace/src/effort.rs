@@ -193,7 +193,7 @@ impl Grid<'_> {
         for (dx, dy) in [(1, 0), (0, 1)] {
             let beside = [self.at(x - dx, y - dy), self.at(x + dx, y + dy)];
             for other in beside.into_iter().flatten() {
-                if !same_surface(shot, other) {
+                if !shot.continues(other) {
                     let step = (other.pixel.beauty() - beauty).luminance();
                     noise.camera += if n == 1.0 {
                         // An edge lies as likely on either side of the border, and anywhere there: 1/2 · 1/12.
@@ -206,8 +206,8 @@ impl Grid<'_> {
             }
             if let [Some(a), Some(b)] = beside
                 && n == 1.0
-                && same_surface(shot, a)
-                && same_surface(shot, b)
+                && shot.continues(a)
+                && shot.continues(b)
             {
                 // Uneven steps: noise has 3/2 of its variance in them, an edge within the pixel six times its error.
                 let bend = |f: &dyn Fn(&Shot) -> f32| (f(shot) - 0.5 * (f(a) + f(b))).powi(2) / 3.0;
@@ -234,7 +234,7 @@ impl Grid<'_> {
         let mut sum = 0.0;
         for (k, weight) in KERNEL.iter().enumerate() {
             let other = self.at(x + k as i64 % 3 - 1, y + k as i64 / 3 - 1)?;
-            if !same_surface(shot, other) || other.effort.shadow != shot.effort.shadow {
+            if !shot.continues(other) || other.effort.shadow != shot.effort.shadow {
                 return None;
             }
             sum += weight * other.lit;
@@ -263,14 +263,6 @@ impl Grid<'_> {
             count += 1.0;
         }
         Noise { camera: sum.camera / count, light: sum.light / count }
-    }
-}
-
-fn same_surface(a: &Shot, b: &Shot) -> bool {
-    match (&a.key, &b.key) {
-        (Some(a), Some(b)) => a.continues(b),
-        (None, None) => true,
-        _ => false,
     }
 }
 

@@ -74,18 +74,6 @@ impl Key {
     }
 }
 
-impl Shot {
-    /// Whether what one pixel tells of its noise holds for another too: they see one smooth surface, or near parts of a glossy
-    /// one that is bent (a tube), whose highlight may have been met in one only.
-    pub fn like(&self, other: &Shot) -> bool {
-        match (&self.key, &other.key) {
-            (Some(a), Some(b)) => a.continues(b) || (self.specular && other.specular && a.near(b)),
-            (None, None) => true,
-            _ => false,
-        }
-    }
-}
-
 /// A pixel with what decides whether it gets more.
 #[derive(Clone, Copy, Debug)]
 pub struct Shot {
@@ -110,6 +98,22 @@ pub struct Shot {
 }
 
 impl Shot {
+    /// Whether the first rays of two pixels met one smooth surface, or both nothing.
+    pub fn continues(&self, other: &Shot) -> bool {
+        match (&self.key, &other.key) {
+            (Some(a), Some(b)) => a.continues(b),
+            (None, None) => true,
+            _ => false,
+        }
+    }
+
+    /// Whether what one pixel tells of its noise holds for another too: they see one smooth surface, or near parts of a glossy
+    /// one that is bent (a tube), whose highlight may have been met in one only.
+    pub fn like(&self, other: &Shot) -> bool {
+        let near = || self.key.zip(other.key).is_some_and(|(a, b)| a.near(&b));
+        self.continues(other) || (self.specular && other.specular && near())
+    }
+
     /// Adds what was seen `before`, with fewer rays.
     pub fn join(&mut self, before: &Shot) {
         let share = before.pixel.samples as f32 / (before.pixel.samples + self.pixel.samples) as f32;
@@ -197,7 +201,7 @@ pub fn shade(
 
 /// Whether another ray through pixel (x, y) meets another surface than that of the first. Along a row and along a column such
 /// rays lie at all heights and widths of their pixels, as evenly as the golden ratio spreads them.
-pub(crate) fn parts(world: &World, view: &View, x: u32, y: u32, shot: &Shot) -> bool {
+pub(crate) fn meets_another(world: &World, view: &View, x: u32, y: u32, shot: &Shot) -> bool {
     const GOLDEN: f64 = 0.618_033_988_749_895;
     let [jx, jy] = [2 * x + y, x + 2 * y].map(|k| (GOLDEN * f64::from(k)).fract());
     let ray = view.ray(x as f32 + jx as f32, y as f32 + jy as f32);

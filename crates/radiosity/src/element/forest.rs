@@ -140,6 +140,12 @@ impl Elements {
         self.nodes[node as usize].vertices.map(|v| self.vertices[v as usize].position)
     }
 
+    /// The edges of a node, each with its lower vertex first.
+    pub fn edges(&self, node: u32) -> [(VertexId, VertexId); 3] {
+        let v = self.nodes[node as usize].vertices;
+        [0, 1, 2].map(|e| (v[e].min(v[(e + 1) % 3]), v[e].max(v[(e + 1) % 3])))
+    }
+
     /// A third of the area of the leaves around each vertex, m².
     pub fn vertex_areas(&self) -> Vec<f32> {
         let mut areas = vec![0.0; self.vertices.len()];
