@@ -7,7 +7,7 @@ use geometry::{Rgb, Vec3, World};
 use radiosity::Config;
 use radiosity::caustic::Caustics;
 use radiosity::element::Side;
-use raytrace::integrator::path::{Aid, aided_radiance, radiance};
+use raytrace::integrator::path::{Aid, Even, aided_radiance, radiance};
 use raytrace::{DiffuseMode, Film, Settings};
 use support::blocks::ALARM;
 use support::build::{Build, camera};
@@ -97,12 +97,16 @@ fn aided_paths_have_the_mean_of_plain_ones() {
         let (mut sum, mut square) = (0.0, 0.0);
         for i in 0..PATHS {
             let mut rng = Rng::new(7 + u64::from(aided), u64::from(i));
-            let ray = eye.ray(rng.f32(), rng.f32(), 1.0);
             let light = match aided {
-                false => radiance(&world, ray, &mut rng).0.total(),
+                false => {
+                    let ray = eye.ray(rng.f32(), rng.f32(), 1.0);
+                    radiance(&world, ray, &mut rng).0.total()
+                }
                 true => {
-                    let aid = Aid { caustics: Some(&caustics), first: rng.array() };
-                    aided_radiance(&world, ray, aid, &mut rng)
+                    let even = Even::new(i % 64, i / 64);
+                    let [x, y] = even.place();
+                    let aid = Aid { caustics: Some(&caustics), even };
+                    aided_radiance(&world, eye.ray(x, y, 1.0), aid, &mut rng)
                 }
             };
             sum += f64::from(light.g);

@@ -2,9 +2,7 @@
 
 use crate::film::{Film, Pixel};
 use crate::pixel::View;
-use crate::render::{
-    Integrator, Outcome, PROBE_RAYS, PROBE_SHARE, Progress, Report, Settings, facts, render,
-};
+use crate::render::{Integrator, Outcome, Progress, Report, Settings, facts, render};
 use crate::verify::Probes;
 use geometry::light_groups::NO_GROUP;
 use geometry::{Camera, LightGroups, Rgb, Scene, World};
@@ -88,8 +86,8 @@ pub fn render_by_light(
     if finished && settings.verify && settings.integrator == Integrator::Hybrid {
         let clock = Instant::now();
         let view = View { camera, width: settings.width, height: settings.height };
-        let rays = PROBE_RAYS + (world.bvh.rays_cast() - before) / PROBE_SHARE;
-        let probes = Probes::trace(world, &view, &film, settings.error, settings.seed, rays, progress);
+        let took = world.bvh.rays_cast() - before;
+        let probes = Probes::trace(world, &view, &film, settings.error, settings.seed, took, progress);
         report.verdict = probes.map(|probes| probes.judge(&film, settings.error));
         report.stages.push(("verify", clock.elapsed().as_secs_f64()));
     }

@@ -115,9 +115,6 @@ const SMALLEST_STEP: f32 = 0.5;
 const HELPED: f64 = 0.85;
 /// An error is missed by so much more than it seems, for the next step is not known exactly.
 const MARGIN: f32 = 0.8;
-/// Rays for the probes at most: so many, and this share of what both passes took.
-pub(crate) const PROBE_RAYS: u64 = 300_000;
-pub(crate) const PROBE_SHARE: u64 = 4;
 
 /// How a render went.
 #[derive(Clone, Debug, Default)]
@@ -293,8 +290,7 @@ fn two_passes(
             if finished && settings.verify {
                 // Beside each gather ray that lands goes a shadow ray.
                 let took = world.bvh.rays_cast() - before + 2 * solution.report.landings as u64;
-                let rays = PROBE_RAYS + took / PROBE_SHARE;
-                let trace = || Probes::trace(world, view, &film, settings.error, settings.seed, rays, watch);
+                let trace = || Probes::trace(world, view, &film, settings.error, settings.seed, took, watch);
                 probes = probes.or_else(trace);
                 verdict = probes.as_ref().map(|probes| probes.judge(&film, settings.error));
                 clock.lap("verify");

@@ -2,7 +2,7 @@
 //! Light by way of mirrors and glass, which paths find too seldom, comes from photons of the probes' own.
 //!
 //! A probe is one pixel, drawn at random from its own cell of a grid over the picture, so that a bad region of one
-//! pixel in a hundred holds five of them. With x̄ the mean of its n batches of paths and s² their variance,
+//! pixel in a hundred holds five of them. With x̄ the mean of its n sets of paths and s² their variance,
 //!
 //! ```text
 //! E[(out − x̄)² − s²/n] = (out − truth)²
@@ -13,7 +13,7 @@
 //! that count would favour those that missed the light.
 
 use crate::film::Film;
-use crate::integrator::path::{self, Aid};
+use crate::integrator::path::{self, Aid, Even};
 use crate::metrics;
 use crate::pixel::View;
 use geometry::World;
@@ -24,16 +24,23 @@ use rayon::prelude::*;
 
 /// Pixels probed, about.
 const PROBES: f32 = 512.0;
-/// Paths go in batches of BATCH², one through each cell of a grid over the pixel: an edge in it, which would need the
-/// most paths, is settled by few.
-const BATCH: u32 = 4;
-/// Batches of the pilot at each.
-const PILOT: u32 = 4;
+/// Paths of a probe go in so many sets, each even in itself ([`Even`]) and independent of the others: the fewer, the more
+/// is won by their evenness, and the less is known of their noise.
+const SETS: u32 = 4;
+/// Paths of a set of the pilot at each probe.
+const PILOT: u32 = 16;
 /// Standard deviation that the paths' noise may leave in the mean squared error, in units of the square of the error
-/// asked: one that is missed by half is seen to be missed.
-const SHARP: f64 = 0.5;
-/// Batches of one probe at most.
-const MOST: f64 = 4096.0;
+/// asked: one that is missed by a third is seen to be missed.
+const SHARP: f64 = 0.35;
+/// So small a one is worth the rays only where they are few beside those of the picture.
+const SHARPEST: f64 = 0.1;
+/// Rays for the probes at most: so many, and this share of what the picture took.
+const LEAST_BUDGET: u64 = 300_000;
+const MOST_SHARE: u64 = 4;
+/// This share of them is theirs in any case, while they get sharper by it.
+const FREE_SHARE: u64 = 16;
+/// Paths of a set of one probe at most.
+const MOST: f64 = 16384.0;
 /// Pictures that the interval is taken from, drawn from the probes with replacement (Efron, "Bootstrap Methods", Ann.
 /// Statist. 7(1), 1979).
 const RESAMPLED: u64 = 1000;
@@ -116,15 +123,16 @@ impl std::fmt::Display for Verdict {
 }
 
 impl Probes {
-    /// Traces probes to hold `film` and its like against: enough paths to tell whether the error is the one `asked`,
-    /// as far as `most_rays` rays reach. `None` when stopped.
+    /// Traces probes to hold `film` and its like against, a picture that `took` so many rays: enough paths to tell
+    /// whether the error is the one `asked`, unless that takes too large a share of them; more where they take a small
+    /// one. `None` when stopped.
     pub fn trace(
         world: &World,
         view: &View,
         film: &Film,
         asked: f32,
         seed: u64,
-        most_rays: u64,
+        took: u64,
         progress: &dyn Progress,
     ) -> Option<Probes> {
         let seed = seed ^ 0x0070_726f_6265;
@@ -136,36 +144,40 @@ impl Probes {
         let caustics = Some(&caustics).filter(|c| !c.is_empty());
         progress.stage("verifying", 2 * cells.len() as u64);
         let before = world.bvh.rays_cast();
-        let trace = |&(pixel, share): &(usize, f64), batches: u32, stream: u64| {
+        let trace = |&(pixel, share): &(usize, f64), paths: u32, stream: u64| {
             if progress.stopped() {
                 return None;
             }
-            let probe = probe(world, view, caustics, pixel, share, batches, seed ^ stream);
+            let probe = probe(world, view, caustics, pixel, share, paths, seed ^ stream);
             progress.advance(1);
             Some(probe)
         };
         let pilot: Option<Vec<Probe>> = cells.par_iter().map(|cell| trace(cell, PILOT, 1)).collect();
         let pilot = pilot?;
-        let rays_a_batch =
-            (world.bvh.rays_cast() - before) as f64 / (cells.len() as f64 * f64::from(PILOT)).max(1.0);
+        let count = cells.len().max(1) as f64;
+        let rays_a_set_path = (world.bvh.rays_cast() - before) as f64 / (count * f64::from(PILOT));
 
-        // Variance of one batch, relative to the pixel's weight in the metric; four batches know it poorly, so that of
-        // all pixels together counts for half.
+        // Variance of sets of one path, were they no more than random, relative to the pixel's weight in the metric; few
+        // sets know it poorly, so that of all pixels together counts for half.
         let own: Vec<f64> =
             pilot.iter().map(|p| f64::from(PILOT) * average(p.noise) / weights.of(film, p)).collect();
-        let all = own.iter().sum::<f64>() / own.len().max(1) as f64;
-        // The variance of the mean squared error, Σ 2 v² / n² / P², is least at n ∝ v^⅔ for a number of batches.
+        let all = own.iter().sum::<f64>() / count;
+        // The variance of the mean squared error, Σ c v² / n² / P² (c: of the paths' mean, and of the estimate of its own
+        // noise), is least at n ∝ v^⅔ for a number of paths.
         let shares: Vec<f64> = own.iter().map(|v| (0.5 * (v + all)).powf(2.0 / 3.0)).collect();
         let sum: f64 = shares.iter().sum();
-        let wanted = (2.0 * sum).sqrt() / (SHARP * f64::from(asked).powi(2) * cells.len() as f64);
-        let affordable = most_rays as f64 / (rays_a_batch * sum).max(1e-30);
-        let scale = wanted.min(affordable);
-        let count = |share: f64| (scale * share).clamp(f64::from(PILOT), MOST) as u32;
-        let paths: u64 = shares.iter().map(|&s| u64::from(count(s) * BATCH * BATCH)).sum();
+        let c = 2.0 + 2.0 / f64::from(SETS - 1);
+        let wanted = |sharp: f64| (c * sum).sqrt() / (sharp * f64::from(asked).powi(2) * count);
+        let affordable = |rays: u64| rays as f64 / (rays_a_set_path * sum).max(1e-30);
+        let needed = wanted(SHARP).min(affordable(LEAST_BUDGET + took / MOST_SHARE));
+        let scale = wanted(SHARPEST).min(affordable(took / FREE_SHARE)).max(needed);
+        // Sets are most even where they hold a power of two.
+        let paths = |share: f64| (scale * share).clamp(f64::from(PILOT), MOST).log2().round().exp2() as u32;
+        let traced: u64 = shares.iter().map(|&s| u64::from(paths(s) * SETS)).sum();
         let jobs: Vec<_> = cells.iter().zip(&shares).collect();
         let probes: Option<Vec<Probe>> =
-            jobs.par_iter().map(|(cell, s)| trace(cell, count(**s), 2)).collect();
-        Some(Probes { probes: probes?, paths })
+            jobs.par_iter().map(|(cell, share)| trace(cell, paths(**share), 2)).collect();
+        Some(Probes { probes: probes?, paths: traced })
     }
 
     /// How far `film` is from the truth.
@@ -229,32 +241,28 @@ fn cells(width: u32, height: u32, seed: u64) -> Vec<(usize, f64)> {
     cells
 }
 
-/// Traces `batches` ≥ 2 independent batches of paths through one pixel.
+/// Traces [`SETS`] independent sets of `paths` each through one pixel.
 fn probe(
     world: &World,
     view: &View,
     caustics: Option<&Caustics>,
     pixel: usize,
     share: f64,
-    batches: u32,
+    paths: u32,
     seed: u64,
 ) -> Probe {
     let (x, y) = (pixel as u32 % view.width, pixel as u32 / view.width);
     let (mut mean, mut spread) = ([0f64; 3], [0f64; 3]);
-    for i in 0..batches {
-        let mut rng = Rng::new(seed, (pixel as u64) << 24 | u64::from(i));
-        let turn = rng.below(BATCH * BATCH);
+    let mut rng = Rng::new(seed, pixel as u64);
+    for i in 0..SETS {
+        let set = rng.u32();
         let mut light = [0f64; 3];
-        for k in 0..BATCH * BATCH {
-            let mut jittered =
-                |cell: u32| [cell % BATCH, cell / BATCH].map(|c| (c as f32 + rng.f32()) / BATCH as f32);
-            let [fx, fy] = jittered(k);
-            // Each cell of the pixel goes with another cell of directions in every batch; 7 and 16 share no divisor.
-            let first = jittered((7 * k + turn) % (BATCH * BATCH));
-            let aid = Aid { caustics, first };
-            let found =
-                path::aided_radiance(world, view.ray(x as f32 + fx, y as f32 + fy), aid, &mut rng).to_array();
-            (0..3).for_each(|c| light[c] += f64::from(found[c]) / f64::from(BATCH * BATCH));
+        for k in 0..paths {
+            let even = Even::new(k, set);
+            let [fx, fy] = even.place();
+            let ray = view.ray(x as f32 + fx, y as f32 + fy);
+            let found = path::aided_radiance(world, ray, Aid { caustics, even }, &mut rng).to_array();
+            (0..3).for_each(|c| light[c] += f64::from(found[c]) / f64::from(paths));
         }
         for c in 0..3 {
             let step = light[c] - mean[c];
@@ -262,7 +270,7 @@ fn probe(
             spread[c] += step * (light[c] - mean[c]);
         }
     }
-    let n = f64::from(batches.max(2));
+    let n = f64::from(SETS);
     Probe { pixel, share, mean, noise: spread.map(|s| s / (n * (n - 1.0))) }
 }
 
@@ -278,7 +286,7 @@ impl Weights {
     }
 
     /// mean_c truth² + 0.01 M², the truth taken as what the film says, or where the paths say otherwise beyond five
-    /// standard errors, as the nearest that they allow: a firefly must not excuse itself. Of four batches two standard
+    /// standard errors, as the nearest that they allow: a firefly must not excuse itself. Of four sets two standard
     /// errors would be too few: those that missed the light know nothing of it, and made errors look a third larger.
     fn of(&self, film: &Film, p: &Probe) -> f64 {
         let out = film.pixels[p.pixel].beauty().to_array();

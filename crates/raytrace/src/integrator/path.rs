@@ -20,6 +20,11 @@ use radiosity::caustic::Caustics;
 use radiosity::gather::ROUGH;
 use std::f32::consts::PI;
 
+mod even;
+
+use even::Choice;
+pub use even::Even;
+
 /// Scatterings after which a path ends whatever it carries. At ρ = 0.95 roulette leaves 2e-6 of the paths so long.
 pub const MAX_BOUNCES: u32 = 256;
 
@@ -40,13 +45,13 @@ pub struct Aid<'a> {
     /// Light that comes to diffuse surfaces by way of mirrors and glass: paths leave it to these photons, for they
     /// meet it seldom and then find it a thousand times too bright.
     pub caustics: Option<&'a Caustics>,
-    /// The numbers in [0, 1) that choose the direction of the first scattering, stratified over the paths of a pixel.
-    pub first: [f32; 2],
+    /// The numbers that choose it, even over the paths of a pixel.
+    pub even: Even,
 }
 
 /// As [`radiance`], all layers together, with some aid.
 pub fn aided_radiance(world: &World, ray: Ray, aid: Aid, rng: &mut Rng) -> Rgb {
-    let path = Path { first: Some(aid.first), caustics: aid.caustics, ..Path::new(world, ray, true) };
+    let path = Path { even: Some(aid.even), caustics: aid.caustics, ..Path::new(world, ray, true) };
     path.trace(rng).0.total()
 }
 
@@ -128,7 +133,7 @@ struct Path<'a> {
     passage: Passage,
     /// See [`Aid`].
     caustics: Option<&'a Caustics>,
-    first: Option<[f32; 2]>,
+    even: Option<Even>,
     /// Specular scatterings since the last diffuse one, if there are photons.
     chain: Option<Chain>,
 }
@@ -168,7 +173,7 @@ impl<'a> Path<'a> {
             last: None,
             passage: Passage::default(),
             caustics: None,
-            first: None,
+            even: None,
             chain: None,
         }
     }
@@ -269,10 +274,7 @@ impl<'a> Path<'a> {
     fn scatter(&mut self, surface: &Surface, t: f32, rng: &mut Rng) -> Option<bool> {
         let bsdf = &surface.bsdf;
         let wo = -self.ray.direction;
-        let mut u: [f32; 3] = rng.array();
-        if let Some(first) = self.first.take() {
-            [u[0], u[1]] = first;
-        }
+        let u = self.numbers(Choice::Direction, rng);
         let sample = bsdf.sample(wo, u);
         // A rough pane is lit from both sides, and so is what light comes through diffusely.
         let rough = !bsdf.is_delta();
@@ -353,7 +355,7 @@ impl<'a> Path<'a> {
     /// One shadow ray.
     fn next_event(&mut self, surface: &Surface, wo: Vec3, preference: Vec3, rng: &mut Rng) {
         let World { scene, emitters, .. } = self.world;
-        let u = rng.array();
+        let u = self.numbers(Choice::Light, rng);
         let Some(light) = emitters.sample(scene, surface.position, preference, u) else { return };
         let (diffuse, mut glossy) =
             (surface.bsdf.eval_diffuse(wo, light.wi), surface.bsdf.eval_glossy(wo, light.wi));
@@ -377,6 +379,14 @@ impl<'a> Path<'a> {
         let found = self.throughput * f * left * light.radiance * (weight * cos / light.pdf);
         let by_diffuse = if self.bounces == 0 { share(diffuse, f) } else { self.diffuse_first };
         self.add_split(found, by_diffuse, self.bounces + 1);
+    }
+
+    /// Three numbers in [0, 1) for a choice at this scattering.
+    fn numbers(&self, choice: Choice, rng: &mut Rng) -> [f32; 3] {
+        match self.even {
+            Some(even) => even.numbers(self.bounces, choice),
+            None => rng.array(),
+        }
     }
 
     /// Notes the first surface that did not let the ray straight on.
