@@ -3,7 +3,7 @@
 use geometry::lobes::{Clearcoat, DiffuseTransmission, Sheen};
 use geometry::{Camera, Light, LightKind, Material, Rgb, Vec3, World};
 use radiosity::Config;
-use raytrace::Settings;
+use raytrace::{DiffuseMode, Settings};
 use std::f32::consts::PI;
 use support::blocks::{ALARM, compare};
 use support::build::{Build, camera, parallel};
@@ -177,6 +177,37 @@ fn light_comes_through_paper() {
         let c = compare(&two_pass, &paths);
         println!("paper, share {share}: {c:?}, mean {}", mean(&two_pass));
         assert!(mean(&two_pass) > 0.5 && c.agrees(0.015, 0.06), "share {share}: {c:?}");
+    }
+}
+
+/// Two such sheets 1 mm apart, a lampshade's two sides: between them it is bright, before them dim, and a pixel that is
+/// done again must not take the one gather for the other.
+#[test]
+fn light_comes_through_two_sheets_of_paper() {
+    let sheet = Material {
+        diffuse_transmission: Some(DiffuseTransmission {
+            share: 0.5,
+            share_texture: None,
+            color: Rgb::splat(0.5),
+            color_texture: None,
+        }),
+        ..matt(0.5)
+    };
+    let world = Build::new()
+        .level(0.0, [-2.0, -2.0], [2.0, 2.0], true, &matt(0.5))
+        .level(1.0, [-1.0, -1.0], [1.0, 1.0], false, &sheet)
+        .level(1.001, [-1.0, -1.0], [1.0, 1.0], false, &sheet)
+        .level(1.5, [-0.3, -0.3], [0.3, 0.3], false, &lamp(100.0))
+        .level(0.9, [-0.1, -0.1], [0.1, 0.1], true, &matt(0.5))
+        .point_lamp(Vec3::new(0.0, 0.4, 0.0), 5.0)
+        .world();
+    let from_below = camera(Vec3::new(0.2, 0.1, 0.6), Vec3::new(0.0, 1.0, 0.0), 0.6);
+    let paths = shoot(&world, &from_below, &path(32, 32, 512));
+    for diffuse in [DiffuseMode::Split, DiffuseMode::Gather] {
+        let two_pass = shoot(&world, &from_below, &Settings { diffuse, ..hybrid(32, 32, 0.02) });
+        let c = compare(&two_pass, &paths);
+        println!("two sheets, {diffuse:?}: {c:?}, mean {}", mean(&two_pass));
+        assert!(mean(&two_pass) > 0.5 && c.agrees(0.01, 0.05), "{diffuse:?}: {c:?}");
     }
 }
 

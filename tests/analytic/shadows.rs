@@ -88,6 +88,44 @@ fn a_penumbra_is_as_wide_as_geometry_says() {
     assert!(worst < 0.02, "{worst}");
 }
 
+/// Slats between a point lamp and a floor, 1.3 pixels wide, their edges along the pixels' columns: every pixel shows the
+/// share of it that is lit, as exactly as is asked.
+#[test]
+fn hard_shadows_finer_than_a_pixel() {
+    let (height, above, pixel) = (8.0f32, 0.25f32, 0.005f32);
+    let (wide, period) = (1.3 * pixel, 3.7 * pixel);
+    let slats: Vec<f32> = (-30..30).map(|k| k as f32 * period).collect();
+    let floor = Build::new().level(0.0, [-2.0, -2.0], [2.0, 2.0], true, &matt(0.5));
+    let world = slats
+        .iter()
+        .fold(floor, |b, &x| b.level(above, [x, -2.0], [x + wide, 2.0], true, &matt(0.0)))
+        .point_lamp(Vec3::new(0.0, height, 0.0), 100.0)
+        .world();
+    let (width, rows) = (64u32, 8u32);
+    let eye = parallel(Vec3::Y * 2.0, Vec3::ZERO, 0.5 * rows as f32 * pixel, 1.9);
+    // Where a shadow of x at height `above` falls.
+    let cast = |x: f32| x * height / (height - above);
+    let shaded = |lo: f32, hi: f32| -> f32 {
+        slats.iter().map(|&x| (cast(x + wide).min(hi) - cast(x).max(lo)).max(0.0)).sum::<f32>() / (hi - lo)
+    };
+    for error in [0.1, 0.01, 0.003] {
+        let film = shoot(&world, &eye, &Settings { gather_rays: Some(16), ..hybrid(width, rows, error) });
+        let off = |(x, y): (u32, u32)| {
+            let p = film.get(x, y);
+            // The middle of the pixel, wherever its rays went.
+            let middle = (p.position.x / pixel).floor() * pixel;
+            let r2 = p.position.x * p.position.x + p.position.z * p.position.z + height * height;
+            let open = 0.5 * 100.0 * height / (r2 * r2.sqrt()) / PI;
+            let lit = 1.0 - shaded(middle, middle + pixel);
+            f64::from(p.direct.g / open - lit).powi(2) / f64::from(lit.powi(2) + 0.01)
+        };
+        let pixels = (0..rows).flat_map(|y| (0..width).map(move |x| (x, y)));
+        let rms = (pixels.map(off).sum::<f64>() / f64::from(width * rows)).sqrt();
+        println!("asked {error}: {rms}");
+        assert!(rms < f64::from(error), "{error} asked: {rms}");
+    }
+}
+
 /// Nothing leaks under a wall that stands on one floor: the camera's room has no opening to the lit one.
 #[test]
 fn the_dark_room_stays_dark() {

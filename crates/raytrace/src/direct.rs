@@ -47,9 +47,20 @@ impl Start<'_> {
 
 /// From one place to the next: no divisor of the numbers of places, which are powers of four and less, so that strata of
 /// the lamp and places do not go hand in hand.
-const STRIDE: usize = 7;
-/// Points at most that a point-like lamp is looked for from.
-const PLACES: usize = 64;
+const STRIDE: u32 = 7;
+
+/// Which of `places` sample `k` of `times` starts from: in turn, or where there are more of them, one of each of as many
+/// parts of their row, which begins at one edge of the pixel and ends at the other.
+fn place_of(k: u32, times: u32, turn: u32, places: u32) -> usize {
+    if times >= places {
+        return ((k * STRIDE + turn) % places) as usize;
+    }
+    let part = u64::from((k * STRIDE + turn) % times);
+    // Not the same place of each part: rows of a pixel are as long as parts may be.
+    let within = u64::from(k.wrapping_add(turn).wrapping_mul(0x9e37_79b9));
+    let places = u64::from(places);
+    ((((part << 32) + within) * places / u64::from(times)) >> 32).min(places - 1) as usize
+}
 
 /// Which lights are sampled at a point, how often.
 #[derive(Debug, Default)]
@@ -135,8 +146,12 @@ pub struct Direct {
     pub glossy: Rgb,
     /// Irradiance with shadows, lx.
     pub irradiance: Rgb,
+    /// Of it, that of lamps without extent: their shadows have hard edges.
+    pub hard: Rgb,
     /// Estimated variance of the luminance of `diffuse` and `glossy`, (cd/m²)².
     pub variance: f32,
+    /// The same of what comes from lamps without extent: other points of the surface make it smaller, more rays do not.
+    pub hard_variance: f32,
 }
 
 /// What is asked of the glossy lobes.
@@ -164,7 +179,7 @@ pub fn direct(
     // Which place goes with which stratum of a lamp is drawn anew each time: always the same would count some parts of the
     // lamp from one side of the pixel alone (the worst column of a penumbra was 2.4 % of the full light off, now below 2 %).
     let turn = if spend.places.len() > 1 { rng.below(spend.places.len() as u32) } else { 0 };
-    let place = |k: u32| spend.places[(k as usize * STRIDE + turn as usize) % spend.places.len()];
+    let place = |k: u32, times: u32| spend.places[place_of(k, times, turn, spend.places.len() as u32)];
     let has_diffuse = surface.bsdf.has_diffuse();
     let (p, n) = (surface.position, surface.ns);
     for &Entry { group, samples, irradiance, .. } in plan.entries.iter().filter(|e| e.chance == 1.0) {
@@ -173,7 +188,16 @@ pub fn direct(
             for k in 0..samples {
                 match sample(stratum(k, samples, spend.phase, rng)) {
                     Some(s) => {
-                        part.add(world, surface, wo, &s, place(k), samples as f32, gloss, has_diffuse);
+                        part.add(
+                            world,
+                            surface,
+                            wo,
+                            &s,
+                            place(k, samples),
+                            samples as f32,
+                            gloss,
+                            has_diffuse,
+                        );
                     }
                     None => part.count += 1,
                 }
@@ -191,7 +215,7 @@ pub fn direct(
                     });
                 }
                 let punctual = matches!(kind, EmitterKind::Punctual(_));
-                let samples = if punctual { spend.places.len().min(PLACES) as u32 } else { samples };
+                let samples = if punctual { spend.places.len() as u32 } else { samples };
                 let Some(seen) = world.emitters.seen_from(light, p) else { continue };
                 add(&mut part, samples, &|u| seen.sample(&world.scene, u));
             }
@@ -285,6 +309,9 @@ impl Part {
         let lit = self.lit * (ratio / n);
         let sent = self.diffuse * (ratio / n);
         out.irradiance += lit;
+        if self.delta {
+            out.hard += lit;
+        }
         out.diffuse += sent;
         out.glossy += self.glossy / n;
         if self.count > 1 {
@@ -295,12 +322,17 @@ impl Part {
             // pixel on the gallery's lamp that alone made 60 % of the picture's squared error.
             out.variance += self.glossy2;
         }
-        if let (Some(_), true) = (exact, estimate > 0.0) {
+        let shadow = |v: f32| {
             // Seen or not seen, as a coin with the visible share v. Where an edge crosses a grid of n strata only those
             // it cuts vary, about √(4 v (1 − v) n) of them by a sixth each: variance ∝ n^-1.5.
-            let v = (lit.luminance() / (estimate * ratio)).clamp(0.0, 1.0);
             let open = sent.luminance() / v.max(0.05);
-            out.variance += open * open * (v * (1.0 - v)).sqrt() / 3.0 / (n * n.sqrt());
+            open * open * (v * (1.0 - v)).sqrt() / 3.0 / (n * n.sqrt())
+        };
+        let v = (lit.luminance() / (estimate * ratio).max(1e-30)).clamp(0.0, 1.0);
+        if let (Some(_), true) = (exact, estimate > 0.0) {
+            out.variance += shadow(v);
+        } else if self.delta && self.count > 1 {
+            out.hard_variance += shadow(v);
         } else if self.count > 1 {
             let mean = self.lit.luminance() / n;
             let spread = (self.lit2 / n - mean * mean).max(0.0) / (n - 1.0);
@@ -319,7 +351,7 @@ fn pooled<'a>(
     plan: &Plan,
     gloss: Gloss,
     phase: u32,
-    place: &dyn Fn(u32) -> Start<'a>,
+    place: &dyn Fn(u32, u32) -> Start<'a>,
     rng: &mut Rng,
     out: &mut Direct,
 ) {
@@ -343,7 +375,7 @@ fn pooled<'a>(
                     surface,
                     wo,
                     &s,
-                    place(k),
+                    place(k, plan.pool),
                     plan.pool as f32,
                     gloss,
                     surface.bsdf.has_diffuse(),
@@ -380,6 +412,25 @@ fn stratum(k: u32, n: u32, phase: u32, rng: &mut Rng) -> [f32; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn places_are_taken_in_turn_or_spread_over_the_pixel() {
+        let taken = |times, turn, places| (0..times).map(move |k| place_of(k, times, turn, places));
+        let mut all: Vec<usize> = taken(64, 5, 16).collect();
+        all.sort_unstable();
+        assert!((0..64).all(|k| all[k] == k / 4), "each of 16 by 4 of 64");
+        for turn in [0, 1, 37, 4000] {
+            // 64 of a grid of 64 × 64: one in each row, in all quarters of it.
+            let mut rows = [0; 64];
+            let mut quarters = [0; 4];
+            for i in taken(64, turn, 4096) {
+                rows[i / 64] += 1;
+                quarters[i % 64 / 16] += 1;
+            }
+            assert_eq!(rows, [1; 64]);
+            assert!(quarters.iter().all(|&n| (12..=20).contains(&n)), "{quarters:?}");
+        }
+    }
 
     #[test]
     fn sixteen_pixels_of_four_samples_cover_all_strata() {

@@ -193,7 +193,13 @@ impl Grid<'_> {
         for (dx, dy) in [(1, 0), (0, 1)] {
             let beside = [self.at(x - dx, y - dy), self.at(x + dx, y + dy)];
             for other in beside.into_iter().flatten() {
-                if !shot.continues(other) {
+                if shot.continues(other) {
+                    if n == 1.0 && other.effort.camera == 1 {
+                        // So does the hard edge of a shadow.
+                        let step = (other.hard - shot.hard) * shot.sent;
+                        noise.camera += step * step / 24.0;
+                    }
+                } else {
                     let step = (other.pixel.beauty() - beauty).luminance();
                     noise.camera += if n == 1.0 {
                         // An edge lies as likely on either side of the border, and anywhere there: 1/2 · 1/12.
@@ -327,11 +333,12 @@ mod tests {
                 effort,
                 key: None,
                 lit,
+                hard: 0.0,
                 sent: 0.25,
                 camera_variance: 0.0,
                 light_variance: 0.0,
                 specular: false,
-                gathered: None,
+                gathered: [None; 2],
             })
         };
         (0..64 * 64).map(shot).collect()

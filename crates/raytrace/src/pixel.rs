@@ -83,8 +83,10 @@ pub struct Shot {
     pub effort: Effort,
     /// What its first ray met; `None` for nothing.
     pub key: Option<Key>,
-    /// Luminance of the direct irradiance of what covers most of the pixel, lx.
+    /// Luminance of the direct irradiance of what covers most of the pixel, lx: by lamps with an extent,
     pub lit: f32,
+    /// and by those without.
+    pub hard: f32,
     /// What of it is sent on toward the eye, 1/sr.
     pub sent: f32,
     /// Variance of the luminance from rays through the pixel: edges, textures, gloss.
@@ -93,8 +95,8 @@ pub struct Shot {
     pub light_variance: f32,
     /// Rays through the pixel go on by way of mirrors, glass or gloss.
     pub specular: bool,
-    /// What the surface gathered that covers most of the pixel.
-    pub gathered: Option<Gathered>,
+    /// What the surface gathered that covers most of the pixel, before it and behind.
+    pub gathered: [Option<Gathered>; 2],
 }
 
 impl Shot {
@@ -149,11 +151,12 @@ pub fn shade(
         effort,
         key: None,
         lit: 0.0,
+        hard: 0.0,
         sent: 0.0,
         camera_variance: 0.0,
         light_variance: 0.0,
         specular: false,
-        gathered: None,
+        gathered: [None; 2],
     };
     let mut sky = Rgb::BLACK;
     for i in 0..n {
@@ -178,9 +181,14 @@ pub fn shade(
     let mut largest = 0;
     for g in &groups {
         let so_far = shot.pixel.beauty().luminance();
-        let known =
-            before.filter(|b| b.key.is_some_and(|key| key.continues(&g.key))).and_then(|b| b.gathered);
-        let gather = known.map_or(Gather::Worth(g.hits.len() as f32 * share), Gather::Done);
+        let gather = match before {
+            Some(Shot { key: Some(key), gathered, .. })
+                if gathered.iter().any(Option::is_some) && key.continues(&g.key) =>
+            {
+                Gather::Done(*gathered)
+            }
+            _ => Gather::Worth(g.hits.len() as f32 * share),
+        };
         let gathered =
             one_surface(hybrid, g, &hits, effort, gather, share, phase(x, y, seed), &mut shot, &mut rng);
         let part = g.hits.len() as f32 * share;
@@ -280,7 +288,7 @@ fn one_surface(
     phase: u32,
     shot: &mut Shot,
     rng: &mut Rng,
-) -> Option<Gathered> {
+) -> [Option<Gathered>; 2] {
     let count = g.hits.len() as f32;
     let part = count * share;
     let middle = g.hits.iter().map(|&i| hits[i].1.position).sum::<Vec3>() / count;
@@ -349,9 +357,11 @@ fn one_surface(
         shot.camera_variance += 0.5 * steps / (count - 1.0) / count * part * part;
     }
     shot.light_variance += lit.variance * coverage * coverage;
+    shot.camera_variance += lit.hard_variance * coverage * coverage;
     p.variance += lit.gather_variance * coverage * coverage;
     if part > 0.49 {
-        shot.lit = lit.straight.luminance();
+        shot.hard = lit.hard.luminance();
+        shot.lit = lit.straight.luminance() - shot.hard;
         shot.sent = albedo.luminance() * surface.coverage / std::f32::consts::PI;
     }
     shot.specular |= surface.bsdf.has_specular() || surface.coverage < 1.0;

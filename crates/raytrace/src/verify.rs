@@ -38,7 +38,7 @@ const SHARPEST: f64 = 0.1;
 const LEAST_BUDGET: u64 = 300_000;
 const MOST_SHARE: u64 = 4;
 /// This share of them is theirs in any case, while they get sharper by it.
-const FREE_SHARE: u64 = 16;
+const FREE_SHARE: u64 = 8;
 /// Paths of a set of one probe at most.
 const MOST: f64 = 16384.0;
 /// Pictures that the interval is taken from, drawn from the probes with replacement (Efron, "Bootstrap Methods", Ann.

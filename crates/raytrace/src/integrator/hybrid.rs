@@ -66,8 +66,8 @@ pub enum Gather {
     Never,
     /// Where it is worth it, for a surface that fills this share of a pixel.
     Worth(f32),
-    /// It was done before.
-    Done(Gathered),
+    /// It was done before, with this before the surface and behind it.
+    Done([Option<Gathered>; 2]),
     /// Where it is worth it, by one of several samples of a pixel that share the rays.
     Shared {
         /// Share of the sample's light that comes by way of the surface.
@@ -116,12 +116,16 @@ pub struct Diffuse {
     pub irradiance: Rgb,
     /// Of it, what comes straight from emitters by way of shadow rays.
     pub straight: Rgb,
+    /// Of that, what lamps without extent bring.
+    pub hard: Rgb,
     /// Estimated variance of the luminance from shadow rays.
     pub variance: f32,
+    /// The same from where the shadow rays of lamps without extent start.
+    pub hard_variance: f32,
     /// The same from a gather.
     pub gather_variance: f32,
-    /// What was gathered, if anything was.
-    pub gathered: Option<Gathered>,
+    /// What was gathered before the surface and, where light passes it, behind.
+    pub gathered: [Option<Gathered>; 2],
 }
 
 impl Hybrid<'_> {
@@ -141,11 +145,18 @@ impl Hybrid<'_> {
     ) -> (Diffuse, Plan) {
         let (mut out, plan) = self.diffuse_of_side(surface, wo, quality, phase, places, rng);
         if let Some(turned) = surface.turned() {
+            let gather = match quality.gather {
+                Gather::Done([_, behind]) => Gather::Done([behind, None]),
+                other => other,
+            };
+            let quality = Quality { gather, ..quality };
             let (through, _) = self.diffuse_of_side(&turned, -wo, quality, phase, places, rng);
             out.direct += through.direct;
             out.indirect += through.indirect;
             out.variance += through.variance;
+            out.hard_variance += through.hard_variance;
             out.gather_variance += through.gather_variance;
+            out.gathered[1] = through.gathered[0];
         }
         (out, plan)
     }
@@ -184,7 +195,9 @@ impl Hybrid<'_> {
             glossy: lit.glossy,
             irradiance: lit.irradiance,
             straight: lit.irradiance,
+            hard: lit.hard,
             variance: lit.variance,
+            hard_variance: lit.hard_variance,
             ..Diffuse::default()
         };
         let quasi = quasi_diffuse(surface, wo);
@@ -198,14 +211,14 @@ impl Hybrid<'_> {
         if from_vertices {
             let e = spot.direct();
             out.direct = photometry::reflected_radiance(albedo, e);
-            (out.irradiance, out.straight) = (e, Rgb::BLACK);
-            out.variance = 0.0;
+            (out.irradiance, out.straight, out.hard) = (e, Rgb::BLACK, Rgb::BLACK);
+            (out.variance, out.hard_variance) = (0.0, 0.0);
         }
         let (mut e, doubt) = (spot.irradiance(), spot.doubt());
         let light = e.mean() + out.straight.mean();
-        out.gathered = match (self.mode, quality.gather) {
+        let gathered = match (self.mode, quality.gather) {
             (DiffuseMode::Vertex, _) | (_, Gather::Never) => None,
-            (_, Gather::Done(gathered)) => Some(gathered),
+            (_, Gather::Done([here, _])) => here,
             (DiffuseMode::Split, Gather::Worth(part)) => {
                 self.gathers.rays(doubt, light, part).map(|rays| self.gather(surface, rays, rng))
             }
@@ -221,7 +234,8 @@ impl Hybrid<'_> {
                 None
             }
         };
-        if let Some(gathered) = out.gathered {
+        out.gathered = [gathered, None];
+        if let Some(gathered) = gathered {
             // In `split` it corrects the vertices, in `gather` it stands for itself.
             let trust = if self.mode == DiffuseMode::Gather { 1.0 } else { trust(doubt, gathered.rays) };
             e += (gathered.e - e) * trust;
