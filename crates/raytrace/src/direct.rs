@@ -316,7 +316,8 @@ impl Part {
         out.glossy += self.glossy / n;
         if self.count > 1 {
             let mean = self.glossy.luminance() / n;
-            out.variance += (self.glossy2 / n - mean * mean).max(0.0) / (n - 1.0);
+            let variance = (self.glossy2 / n - mean * mean).max(0.0) / (n - 1.0);
+            *(if self.delta { &mut out.hard_variance } else { &mut out.variance }) += variance;
         } else if !self.delta {
             // A single sample in a narrow lobe is mostly nothing, and seldom very much: taken for exact it left a lone
             // pixel on the gallery's lamp that alone made 60 % of the picture's squared error.

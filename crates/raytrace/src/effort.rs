@@ -195,7 +195,7 @@ impl Grid<'_> {
             for other in beside.into_iter().flatten() {
                 if shot.continues(other) {
                     if n == 1.0 && other.effort.camera == 1 {
-                        // So does the hard edge of a shadow.
+                        // The hard edge of a shadow, as one of a surface: see below.
                         let step = (other.hard - shot.hard) * shot.sent;
                         noise.camera += step * step / 24.0;
                     }
