@@ -3,7 +3,7 @@
 //! Samples are independent and seeds fixed; z by the measured variance, |z| < 4.9, so one false alarm in a million each.
 
 use geometry::sampling::Rng;
-use geometry::{Rgb, Vec3, World};
+use geometry::{Camera, Rgb, Vec3, World};
 use radiosity::Config;
 use radiosity::caustic::Caustics;
 use radiosity::element::Side;
@@ -14,7 +14,7 @@ use support::build::{Build, camera};
 use support::files::asset;
 use support::picture::{hybrid, path, shoot, shoot_with, solve};
 use support::solved::area_mean;
-use support::stuff::{lamp, matt, metal};
+use support::stuff::{glass, lamp, matt, metal};
 
 /// The variance layer of the reference is that of its pixels: squared differences of two independent pictures over the
 /// sum of their variances average 1. Over 24² pixels of 64 paths the average has a standard error of 6 % (√(2/576)), or
@@ -92,30 +92,7 @@ fn aided_paths_have_the_mean_of_plain_ones() {
         .world();
     let caustics = Caustics::trace(&world, 1_000_000, 1);
     let eye = camera(c(-0.2, 1.0, 0.0), c(-0.2, 0.0, 0.001), 0.5);
-    let mean = |aided: bool| {
-        const PATHS: u32 = 200_000;
-        let (mut sum, mut square) = (0.0, 0.0);
-        for i in 0..PATHS {
-            let mut rng = Rng::new(7 + u64::from(aided), u64::from(i));
-            let light = match aided {
-                false => {
-                    let ray = eye.ray(rng.f32(), rng.f32(), 1.0);
-                    radiance(&world, ray, &mut rng).0.total()
-                }
-                true => {
-                    let even = Even::new(i % 64, i / 64);
-                    let [x, y] = even.place();
-                    let aid = Aid { caustics: Some(&caustics), even };
-                    aided_radiance(&world, eye.ray(x, y, 1.0), aid, &mut rng)
-                }
-            };
-            sum += f64::from(light.g);
-            square += f64::from(light.g).powi(2);
-        }
-        let n = f64::from(PATHS);
-        (sum / n, (square / n - (sum / n).powi(2)).max(0.0) / n)
-    };
-    let ((plain, v), (aided, w)) = (mean(false), mean(true));
+    let ((plain, v), (aided, w)) = plain_and_aided(&world, &eye, Some(&caustics));
     let share = {
         let e = caustics.irradiance(c(-0.2, 0.0, 0.0), Vec3::Y);
         f64::from(0.5 * e.g / std::f32::consts::PI) / plain
@@ -125,6 +102,54 @@ fn aided_paths_have_the_mean_of_plain_ones() {
     // Of what the mirror brings a fiftieth is left to the estimate by photons.
     let allowed = ALARM * (v + w).sqrt() + 0.02 * share * plain;
     assert!((aided - plain).abs() < allowed && allowed < 0.02 * plain, "{aided}, not {plain}: {allowed}");
+}
+
+/// Mean and variance of that mean over paths of one picture, plain and with aid.
+fn plain_and_aided(world: &World, eye: &Camera, caustics: Option<&Caustics>) -> ((f64, f64), (f64, f64)) {
+    let mean = |aided: bool| {
+        const PATHS: u32 = 200_000;
+        let (mut sum, mut square) = (0.0, 0.0);
+        for i in 0..PATHS {
+            let mut rng = Rng::new(7 + u64::from(aided), u64::from(i));
+            let light = match aided {
+                false => {
+                    let ray = eye.ray(rng.f32(), rng.f32(), 1.0);
+                    radiance(world, ray, &mut rng).0.total()
+                }
+                true => {
+                    let even = Even::new(i % 64, i / 64);
+                    let [x, y] = even.place();
+                    aided_radiance(world, eye.ray(x, y, 1.0), Aid { caustics, even }, &mut rng)
+                }
+            };
+            sum += f64::from(light.g);
+            square += f64::from(light.g).powi(2);
+        }
+        let n = f64::from(PATHS);
+        (sum / n, (square / n - (sum / n).powi(2)).max(0.0) / n)
+    };
+    (mean(false), mean(true))
+}
+
+/// Three panes between the eye and a floor in the light: a number that let a path through the first must not choose again
+/// at the second, or all would let pass what one does.
+#[test]
+fn probes_look_through_panes_as_plain_paths_do() {
+    let pane = glass(1.5, None);
+    let at = |b: Build, y: f32| b.level(y, [-2.0, -2.0], [2.0, 2.0], true, &pane);
+    let floor = Build::new().level(0.0, [-1.0, -1.0], [1.0, 1.0], true, &matt(0.5)).level(
+        0.4,
+        [-0.9, -0.9],
+        [-0.5, 0.9],
+        false,
+        &lamp(10.0),
+    );
+    let world = [0.6, 0.7, 0.8].into_iter().fold(floor, at).world();
+    let eye = camera(Vec3::new(0.3, 1.0, 0.0), Vec3::new(0.3, 0.0, 0.001), 0.3);
+    let ((plain, v), (aided, w)) = plain_and_aided(&world, &eye, None);
+    println!("plain {plain}, aided {aided}");
+    let allowed = ALARM * (v + w).sqrt();
+    assert!((aided - plain).abs() < allowed && allowed < 0.04 * plain, "{aided}, not {plain}: {allowed}");
 }
 
 /// A dark room beside a bright one, with a gap of 10 cm between: its light is found by one ray in a hundred, and its mean

@@ -134,6 +134,8 @@ struct Path<'a> {
     /// See [`Aid`].
     caustics: Option<&'a Caustics>,
     even: Option<Even>,
+    /// Surfaces met, those passed straight on too: the numbers that let a path pass must not choose again at the next.
+    met: u32,
     /// Specular scatterings since the last diffuse one, if there are photons.
     chain: Option<Chain>,
 }
@@ -174,6 +176,7 @@ impl<'a> Path<'a> {
             passage: Passage::default(),
             caustics: None,
             even: None,
+            met: 0,
             chain: None,
         }
     }
@@ -274,6 +277,7 @@ impl<'a> Path<'a> {
     fn scatter(&mut self, surface: &Surface, t: f32, rng: &mut Rng) -> Option<bool> {
         let bsdf = &surface.bsdf;
         let wo = -self.ray.direction;
+        self.met += 1;
         let u = self.numbers(Choice::Direction, rng);
         let sample = bsdf.sample(wo, u);
         // A rough pane is lit from both sides, and so is what light comes through diffusely.
@@ -384,7 +388,7 @@ impl<'a> Path<'a> {
     /// Three numbers in [0, 1) for a choice at this scattering.
     fn numbers(&self, choice: Choice, rng: &mut Rng) -> [f32; 3] {
         match self.even {
-            Some(even) => even.numbers(self.bounces, choice),
+            Some(even) => even.numbers(self.met, choice),
             None => rng.array(),
         }
     }

@@ -37,9 +37,9 @@ impl Even {
         [x, y]
     }
 
-    /// For a choice at the scattering after `bounces` others.
-    pub(super) fn numbers(self, bounces: u32, choice: Choice) -> [f32; 3] {
-        let [a, b, c, _] = self.four(1 + 2 * bounces + choice as u32);
+    /// For a choice at the `met`th surface, from 1.
+    pub(super) fn numbers(self, met: u32, choice: Choice) -> [f32; 3] {
+        let [a, b, c, _] = self.four(2 * met + choice as u32);
         [a, b, c]
     }
 
@@ -66,13 +66,13 @@ mod tests {
     fn every_choice_of_a_set_fills_the_square_evenly() {
         for seed in 0..100 {
             assert_eq!(fullest(|i| Even::new(i, seed).place()), 4);
-            for bounces in 0..5 {
+            for met in 1..6 {
                 for choice in [Choice::Direction, Choice::Light] {
                     let first = |i| {
-                        let [a, b, _] = Even::new(i, seed).numbers(bounces, choice);
+                        let [a, b, _] = Even::new(i, seed).numbers(met, choice);
                         [a, b]
                     };
-                    assert_eq!(fullest(first), 4, "{seed} {bounces} {choice:?}");
+                    assert_eq!(fullest(first), 4, "{seed} {met} {choice:?}");
                 }
             }
         }
@@ -87,10 +87,10 @@ mod tests {
             (0..2000).map(sum).sum::<f64>() / (64.0 * 2000.0)
         };
         let place = |i, seed| Even::new(i, seed).place()[0];
-        let direction = |i, seed| Even::new(i, seed).numbers(0, Choice::Direction)[0];
-        let light = |i, seed| Even::new(i, seed).numbers(0, Choice::Light)[0];
-        let next = |i, seed| Even::new(i, seed).numbers(1, Choice::Direction)[0];
-        let another = |i, seed| Even::new(i, seed + 7919).numbers(0, Choice::Direction)[0];
+        let direction = |i, seed| Even::new(i, seed).numbers(1, Choice::Direction)[0];
+        let light = |i, seed| Even::new(i, seed).numbers(1, Choice::Light)[0];
+        let next = |i, seed| Even::new(i, seed).numbers(2, Choice::Direction)[0];
+        let another = |i, seed| Even::new(i, seed + 7919).numbers(1, Choice::Direction)[0];
         let others: [&dyn Fn(u32, u32) -> f32; 4] = [&place, &light, &next, &another];
         for other in others {
             let p = product(&direction, other);
