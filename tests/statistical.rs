@@ -148,8 +148,9 @@ fn probes_look_through_panes_as_plain_paths_do() {
     let eye = camera(Vec3::new(0.3, 1.0, 0.0), Vec3::new(0.3, 0.0, 0.001), 0.3);
     let ((plain, v), (aided, w)) = plain_and_aided(&world, &eye, None);
     println!("plain {plain}, aided {aided}");
+    // With the same numbers for each pane 3.4 % too much came through.
     let allowed = ALARM * (v + w).sqrt();
-    assert!((aided - plain).abs() < allowed && allowed < 0.04 * plain, "{aided}, not {plain}: {allowed}");
+    assert!((aided - plain).abs() < allowed && allowed < 0.03 * plain, "{aided}, not {plain}: {allowed}");
 }
 
 /// A dark room beside a bright one, with a gap of 10 cm between: its light is found by one ray in a hundred, and its mean

@@ -207,6 +207,7 @@ fn light_comes_through_two_sheets_of_paper() {
         let two_pass = shoot(&world, &from_below, &Settings { diffuse, ..hybrid(32, 32, 0.02) });
         let c = compare(&two_pass, &paths);
         println!("two sheets, {diffuse:?}: {c:?}, mean {}", mean(&two_pass));
+        // 2 % is asked, half of it for noise; one gather taken for the other made the mean 1.9 % and a block 9 % too dark.
         assert!(mean(&two_pass) > 0.5 && c.agrees(0.01, 0.05), "{diffuse:?}: {c:?}");
     }
 }

@@ -1,6 +1,7 @@
 //! Direct light and where it ends: counted once, with sharp and soft edges in their places, and nothing beyond walls.
 
 use geometry::polygon::polygon_irradiance;
+use geometry::sampling::Rng;
 use geometry::{Rgb, Vec3, World};
 use radiosity::element::Side;
 use raytrace::{DiffuseMode, Film, Pixel, Settings};
@@ -122,6 +123,36 @@ fn hard_shadows_finer_than_a_pixel() {
         let pixels = (0..rows).flat_map(|y| (0..width).map(move |x| (x, y)));
         let rms = (pixels.map(off).sum::<f64>() / f64::from(width * rows)).sqrt();
         println!("asked {error}: {rms}");
+        assert!(rms < f64::from(error), "{error} asked: {rms}");
+    }
+}
+
+/// Two hundred point lamps of all strengths over a floor, nothing between: what each sends is known, and only the choice
+/// among them by few rays is random. It is seen as noise, and taken down to what is asked.
+#[test]
+fn a_choice_among_many_point_lamps_is_as_exact_as_asked() {
+    let mut rng = Rng::new(5, 5);
+    let lamps: Vec<(Vec3, f32)> = (0..200)
+        .map(|_| {
+            let [x, y, z, strength] = rng.array();
+            (Vec3::new(4.0 * x - 2.0, 0.5 + y, 4.0 * z - 2.0), 20.0 * strength * strength * strength)
+        })
+        .collect();
+    let floor = Build::new().level(0.0, [-2.0, -2.0], [2.0, 2.0], true, &matt(0.5));
+    let world = lamps.iter().fold(floor, |b, &(p, intensity)| b.point_lamp(p, intensity)).world();
+    let eye = parallel(Vec3::Y * 0.4, Vec3::ZERO, 0.4, 0.1);
+    for error in [0.1, 0.03] {
+        let film = shoot(&world, &eye, &Settings { gather_rays: Some(16), ..hybrid(32, 32, error) });
+        let off = |p: &Pixel| {
+            let sent = |&(lamp, intensity): &(Vec3, f32)| {
+                let way = lamp - p.position;
+                intensity * way.y / way.length().powi(3)
+            };
+            let open = 0.5 * lamps.iter().map(sent).sum::<f32>() / PI;
+            f64::from(p.direct.g / open - 1.0).powi(2)
+        };
+        let rms = (film.pixels.iter().map(off).sum::<f64>() / film.pixels.len() as f64).sqrt();
+        println!("many lamps, asked {error}: {rms}");
         assert!(rms < f64::from(error), "{error} asked: {rms}");
     }
 }

@@ -146,11 +146,11 @@ pub struct Direct {
     pub glossy: Rgb,
     /// Irradiance with shadows, lx.
     pub irradiance: Rgb,
-    /// Of it, that of lamps without extent: their shadows have hard edges.
+    /// Of it, that of lamps without extent that are looked for one by one: their shadows have hard edges.
     pub hard: Rgb,
     /// Estimated variance of the luminance of `diffuse` and `glossy`, (cd/m²)².
     pub variance: f32,
-    /// The same of what comes from lamps without extent: other points of the surface make it smaller, more rays do not.
+    /// The same of those lamps: other points of the surface make it smaller, more rays do not.
     pub hard_variance: f32,
 }
 
@@ -215,6 +215,7 @@ pub fn direct(
                     });
                 }
                 let punctual = matches!(kind, EmitterKind::Punctual(_));
+                part.hard = punctual;
                 let samples = if punctual { spend.places.len() as u32 } else { samples };
                 let Some(seen) = world.emitters.seen_from(light, p) else { continue };
                 add(&mut part, samples, &|u| seen.sample(&world.scene, u));
@@ -242,6 +243,8 @@ struct Part {
     glossy2: f32,
     /// A lamp without extent was among them.
     delta: bool,
+    /// All are of one lamp without extent: they differ by where they start.
+    hard: bool,
 }
 
 impl Part {
@@ -309,7 +312,7 @@ impl Part {
         let lit = self.lit * (ratio / n);
         let sent = self.diffuse * (ratio / n);
         out.irradiance += lit;
-        if self.delta {
+        if self.hard {
             out.hard += lit;
         }
         out.diffuse += sent;
@@ -317,7 +320,7 @@ impl Part {
         if self.count > 1 {
             let mean = self.glossy.luminance() / n;
             let variance = (self.glossy2 / n - mean * mean).max(0.0) / (n - 1.0);
-            *(if self.delta { &mut out.hard_variance } else { &mut out.variance }) += variance;
+            *(if self.hard { &mut out.hard_variance } else { &mut out.variance }) += variance;
         } else if !self.delta {
             // A single sample in a narrow lobe is mostly nothing, and seldom very much: taken for exact it left a lone
             // pixel on the gallery's lamp that alone made 60 % of the picture's squared error.
@@ -332,7 +335,7 @@ impl Part {
         let v = (lit.luminance() / (estimate * ratio).max(1e-30)).clamp(0.0, 1.0);
         if let (Some(_), true) = (exact, estimate > 0.0) {
             out.variance += shadow(v);
-        } else if self.delta && self.count > 1 {
+        } else if self.hard && self.count > 1 {
             out.hard_variance += shadow(v);
         } else if self.count > 1 {
             let mean = self.lit.luminance() / n;

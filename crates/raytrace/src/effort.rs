@@ -194,7 +194,7 @@ impl Grid<'_> {
             let beside = [self.at(x - dx, y - dy), self.at(x + dx, y + dy)];
             for other in beside.into_iter().flatten() {
                 if shot.continues(other) {
-                    if n == 1.0 && other.effort.camera == 1 {
+                    if n == 1.0 {
                         // The hard edge of a shadow, as one of a surface: see below.
                         let step = (other.hard - shot.hard) * shot.sent;
                         noise.camera += step * step / 24.0;

@@ -30,14 +30,15 @@ const SETS: u32 = 4;
 /// Paths of a set of the pilot at each probe.
 const PILOT: u32 = 16;
 /// Standard deviation that the paths' noise may leave in the mean squared error, in units of the square of the error
-/// asked: one that is missed by a third is seen to be missed.
+/// asked. A picture is judged by 2.6 of them: one of 1.4 times the error asked is seen to be missed. It came out as 1 to 2 times
+/// this in three small rooms, over 24 seeds, for few paths carry much of the light.
 const SHARP: f64 = 0.35;
 /// So small a one is worth the rays only where they are few beside those of the picture.
 const SHARPEST: f64 = 0.1;
 /// Rays for the probes at most: so many, and this share of what the picture took.
 const LEAST_BUDGET: u64 = 300_000;
 const MOST_SHARE: u64 = 4;
-/// This share of them is theirs in any case, while they get sharper by it.
+/// This share of them is theirs in any case, while they get sharper by it: a thirtieth of the time in a furnished room.
 const FREE_SHARE: u64 = 8;
 /// Paths of a set of one probe at most.
 const MOST: f64 = 16384.0;

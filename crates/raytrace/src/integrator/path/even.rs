@@ -23,10 +23,7 @@ pub(super) enum Choice {
 }
 
 impl Even {
-    /// Paths of a set at most; the sequence has no more.
-    pub const MOST: u32 = 1 << 16;
-
-    /// Path `index` < [`Even::MOST`] of set `seed`. A set is most even where it holds a power of two of paths.
+    /// Path `index` < 2¹⁶ of set `seed`; the sequence has no more. A set is most even where it holds a power of two of paths.
     pub fn new(index: u32, seed: u32) -> Even {
         Even { index, seed }
     }
