@@ -92,11 +92,11 @@ pub fn follow(
             let behind = surface.turned().filter(|_| chosen);
             let sides = [Some((&surface, wo, rough)), behind.as_ref().map(|turned| (turned, -wo, false))];
             for (surface, wo, rough) in sides.into_iter().flatten() {
-                if let Some((light, brought)) = lamps_through(world, surface, wo, scale, rough, rng) {
+                lamps_through(world, surface, wo, scale, rough, rng, |light, brought| {
                     let brought = throughput * brought * PI;
                     lit(light, brought);
                     out.direct += brought;
-                }
+                });
             }
         }
         if chosen {
@@ -127,8 +127,8 @@ pub fn follow(
     out
 }
 
-/// Radiance toward `wo` of one light sample at `surface`, and the light: its diffuse lobe times `diffuse`, and its glossy
-/// lobe if asked.
+/// Radiance toward `wo` of one light sample of each kind at `surface`, and the light: its diffuse lobe times `diffuse`, and
+/// its glossy lobe if asked.
 fn lamps_through(
     world: &World,
     surface: &Surface,
@@ -136,23 +136,26 @@ fn lamps_through(
     diffuse: f32,
     glossy: bool,
     rng: &mut Rng,
-) -> Option<(u32, Rgb)> {
-    let u = [rng.f32(), rng.f32(), rng.f32()];
-    let light = world.emitters.sample(&world.scene, surface.position, surface.ns, u)?;
-    let cos = light.wi.dot(surface.ns);
-    let beyond = light.wi.dot(surface.ng) <= 0.0;
-    if beyond && !glossy {
-        return None;
+    mut each: impl FnMut(u32, Rgb),
+) {
+    for kind in 0..world.emitters.kinds() {
+        let u = [rng.f32(), rng.f32(), rng.f32()];
+        let sample = world.emitters.sample_kind(&world.scene, kind, surface.position, surface.ns, u);
+        let Some(light) = sample else { continue };
+        let cos = light.wi.dot(surface.ns);
+        let beyond = light.wi.dot(surface.ng) <= 0.0;
+        if beyond && !glossy {
+            continue;
+        }
+        let mut f = if beyond { Rgb::BLACK } else { surface.bsdf.eval_diffuse(wo, light.wi) * diffuse };
+        if glossy {
+            f += surface.bsdf.eval_glossy(wo, light.wi);
+        }
+        let brought = f * light.radiance * (cos.abs() / light.pdf);
+        if brought.max_channel() > 0.0 && brought.is_finite() {
+            each(light.light, brought * world.transmittance(&light.shadow_ray(surface.position, surface.ng)));
+        }
     }
-    let mut f = if beyond { Rgb::BLACK } else { surface.bsdf.eval_diffuse(wo, light.wi) * diffuse };
-    if glossy {
-        f += surface.bsdf.eval_glossy(wo, light.wi);
-    }
-    let brought = f * light.radiance * (cos.abs() / light.pdf);
-    if brought.max_channel() <= 0.0 || !brought.is_finite() {
-        return None;
-    }
-    Some((light.light, brought * world.transmittance(&light.shadow_ray(surface.position, surface.ng))))
 }
 
 /// A place to gather at: a point with the geometric normal of its facet, on the side of interest.
@@ -201,7 +204,7 @@ pub fn row(
                 landings.push(Landing::new(hit.triangle, side, hit.u, hit.v, weight * share));
             }
         };
-        let lit = |light, brought| {
+        let lit = |light, brought: Rgb| {
             if let Some(groups) = groups {
                 by_group[groups.of_light(light)] += brought * share;
             }
@@ -231,7 +234,7 @@ pub fn lattice_share(rays: u32) -> f32 {
 }
 
 /// Irradiance (lx) straight from the emitters around the unit normal `ns`, by `samples` light samples shared evenly
-/// among `origins`; `lit` hears of each light's part.
+/// among kinds of light and `origins`; `lit` hears of each light's part.
 pub fn direct(
     world: &World,
     origins: &[Origin],
@@ -243,21 +246,26 @@ pub fn direct(
 ) -> Rgb {
     let mut rng = Rng::new(seed ^ 0x6469_7265_6374, stream);
     let mut sum = Rgb::BLACK;
-    for i in 0..samples {
-        let origin = &origins[i as usize % origins.len()];
-        let u = [(i as f32 + rng.f32()) / samples as f32, rng.f32(), rng.f32()];
-        let Some(light) = world.emitters.sample(&world.scene, origin.position, ns, u) else { continue };
-        let cos = light.wi.dot(ns);
-        if cos <= 0.0 || light.wi.dot(origin.ng) <= 0.0 {
-            continue;
-        }
-        let ray = light.shadow_ray(origin.position, origin.ng);
-        let brought = light.radiance * (cos / light.pdf);
-        if brought.is_finite() && !brought.is_black() {
-            let brought = brought * world.transmittance(&ray);
-            lit(light.light, brought / samples as f32);
-            sum += brought;
+    let kinds = world.emitters.kinds();
+    for kind in 0..kinds {
+        let samples = samples.div_ceil(kinds);
+        for i in 0..samples {
+            let origin = &origins[i as usize % origins.len()];
+            let u = [(i as f32 + rng.f32()) / samples as f32, rng.f32(), rng.f32()];
+            let sample = world.emitters.sample_kind(&world.scene, kind, origin.position, ns, u);
+            let Some(light) = sample else { continue };
+            let cos = light.wi.dot(ns);
+            if cos <= 0.0 || light.wi.dot(origin.ng) <= 0.0 {
+                continue;
+            }
+            let ray = light.shadow_ray(origin.position, origin.ng);
+            let brought = light.radiance * (cos / (light.pdf * samples as f32));
+            if brought.is_finite() && !brought.is_black() {
+                let brought = brought * world.transmittance(&ray);
+                lit(light.light, brought);
+                sum += brought;
+            }
         }
     }
-    sum / samples as f32
+    sum
 }

@@ -4,6 +4,9 @@ use super::{EmitterKind, Emitters, LightSample};
 use crate::math::{Vec2, Vec3, to_world};
 use crate::{Scene, Sky, sampling};
 
+/// Lights from infinitely far that are asked one by one at most.
+const MANY: u32 = 3;
+
 impl Emitters {
     /// One way to one light for the point `p`; `None` when the draw meets a light that sends nothing there.
     ///
@@ -12,7 +15,48 @@ impl Emitters {
     /// - `u`: in [0, 1)³; the first chooses the light.
     pub fn sample(&self, scene: &Scene, p: Vec3, n: Vec3, u: [f32; 3]) -> Option<LightSample> {
         let (light, probability) = self.choose(p, n, u[0])?;
-        let u = [u[1], u[2]];
+        self.toward(scene, light, probability, p, n, [u[1], u[2]])
+    }
+
+    /// Kinds of light that one asks by themselves: those that have a place, and each of those from infinitely far; all
+    /// of the latter as one where they are many.
+    pub fn kinds(&self) -> u32 {
+        let far = self.far.len() as u32;
+        u32::from(self.tree_lights > 0) + if far > MANY { 1 } else { far }
+    }
+
+    /// As [`Emitters::sample`] for one of [`Emitters::kinds`]. The sum over them varies less: a lamp in a room by day is
+    /// not drawn less often for the sun that does not get there.
+    pub fn sample_kind(
+        &self,
+        scene: &Scene,
+        kind: u32,
+        p: Vec3,
+        n: Vec3,
+        u: [f32; 3],
+    ) -> Option<LightSample> {
+        let placed = u32::from(self.tree_lights > 0);
+        let (light, probability) = match kind.checked_sub(placed) {
+            None => self.tree.choose(p, n, u[0])?,
+            Some(far) if self.far.len() as u32 <= MANY => (self.far.get(far as usize)?.0, 1.0),
+            Some(_) => {
+                let (light, share) = self.choose_far(u[0] * (1.0 - self.tree_share))?;
+                (light, share / (1.0 - self.tree_share))
+            }
+        };
+        self.toward(scene, light, probability, p, n, [u[1], u[2]])
+    }
+
+    /// A way to one light that was chosen with `probability`.
+    fn toward(
+        &self,
+        scene: &Scene,
+        light: u32,
+        probability: f32,
+        p: Vec3,
+        n: Vec3,
+        u: [f32; 2],
+    ) -> Option<LightSample> {
         let s = match (&self.lights[light as usize], n != Vec3::ZERO) {
             (EmitterKind::Sky(Sky::Constant(radiance)), true) => {
                 let wi = to_world(sampling::cosine_hemisphere(Vec2::from(u)), n);
@@ -57,12 +101,16 @@ impl Emitters {
     }
 
     /// A light for `p`, and the probability of that choice.
-    fn choose(&self, p: Vec3, n: Vec3, mut u: f32) -> Option<(u32, f32)> {
+    fn choose(&self, p: Vec3, n: Vec3, u: f32) -> Option<(u32, f32)> {
         if u < self.tree_share {
             let (light, probability) = self.tree.choose(p, n, u / self.tree_share)?;
             return Some((light, probability * self.tree_share));
         }
-        u -= self.tree_share;
+        self.choose_far(u - self.tree_share)
+    }
+
+    /// One of those from infinitely far for `u` in [0, the sum of their probabilities), and that of its choice.
+    fn choose_far(&self, mut u: f32) -> Option<(u32, f32)> {
         for &(light, share) in &self.far {
             if u < share {
                 return Some((light, share));
@@ -130,6 +178,30 @@ mod tests {
         let exact = 0.5 * PI + 3.0 + 3.0 / 4.0 + 5.0 * PI * polygon_irradiance(Vec3::ZERO, Vec3::Y, &corners);
         let e = irradiance(&scene, Vec3::ZERO, Vec3::Y);
         assert!((e / exact - 1.0).abs() < 0.01, "{e} {exact}");
+        let e = by_kinds(&scene, 3);
+        assert!((e / exact - 1.0).abs() < 0.01, "by kinds {e} {exact}");
+        // Many suns are asked as one, with the sky.
+        let sun = LightKind::Directional { direction: Vec3::NEG_Y };
+        scene.lights.extend((0..5).map(|_| Light {
+            name: String::new(),
+            intensity: Rgb::splat(0.4),
+            kind: sun.clone(),
+        }));
+        let e = by_kinds(&scene, 2);
+        assert!((e / (exact + 2.0) - 1.0).abs() < 0.01, "many {e} {exact}");
+    }
+
+    /// Unshadowed irradiance at the origin of all kinds of light by themselves, which are to be so many.
+    fn by_kinds(scene: &Scene, kinds: u32) -> f32 {
+        let emitters = Emitters::build(scene);
+        assert_eq!(emitters.kinds(), kinds);
+        let mut sum = 0f64;
+        let k = 50_000;
+        for (kind, u) in (0..kinds).flat_map(|kind| points(k).map(move |u| (kind, u))) {
+            let sample = emitters.sample_kind(scene, kind, Vec3::ZERO, Vec3::Y, [u[0], u[1], u[2]]);
+            sum += sample.map_or(0.0, |s| f64::from(s.radiance.g * s.wi.y.max(0.0) / s.pdf));
+        }
+        (sum / k as f64) as f32
     }
 
     #[test]
