@@ -227,8 +227,12 @@ pub fn row(
     }
 }
 
-/// Share of the variance of independent rays that a lattice of `rays` leaves: about half of it with 64; its error falls
-/// with rays^-0.8 (128 → 3.3 %, 1024 → 0.67 %, measured).
+/// Share of the variance of independent rays that a lattice of `rays` leaves, where the light is as even as in a Cornell
+/// box: about half of it with 64; its error falls with rays^-0.8 (128 → 3.3 %, 1024 → 0.67 %, measured).
+///
+/// In full rooms this believes too much. Of 256 rays, eight times at about 450 sites of each, the light straight from
+/// emitters where they land kept 0.88 to 1 of that variance in eleven furnished rooms, 0.46 in the box, 0.21 in the box with
+/// mirror and glass; this says 0.22.
 pub fn lattice_share(rays: u32) -> f32 {
     0.5 * (64.0 / rays as f32).powf(0.6)
 }

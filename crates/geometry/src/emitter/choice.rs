@@ -4,7 +4,7 @@ use super::{EmitterKind, Emitters, LightSample};
 use crate::math::{Vec2, Vec3, to_world};
 use crate::{Scene, Sky, sampling};
 
-/// Lights from infinitely far that are asked one by one at most.
+/// Lights from infinitely far that are asked one by one at most, for each costs a shadow ray: a sky, a sun, and one to spare.
 const MANY: u32 = 3;
 
 impl Emitters {
@@ -202,6 +202,24 @@ mod tests {
             sum += sample.map_or(0.0, |s| f64::from(s.radiance.g * s.wi.y.max(0.0) / s.pdf));
         }
         (sum / k as f64) as f32
+    }
+
+    /// However bright the day, each look brings about what the lamp sends: at most the whole of it seen at a right angle.
+    #[test]
+    fn a_lamp_by_day_is_drawn_every_time() {
+        let mut scene = scene_of(quad(), 5.0);
+        let kind = LightKind::Directional { direction: Vec3::Y };
+        scene.lights = vec![Light { name: String::new(), intensity: Rgb::splat(1e5), kind }];
+        let emitters = Emitters::build(&scene);
+        let exact = 5.0 * PI * polygon_irradiance(Vec3::ZERO, Vec3::Y, &scene.mesh.positions);
+        let largest = |draw: &dyn Fn([f32; 3]) -> Option<LightSample>| {
+            let drawn = points(5_000).filter_map(|u| draw([u[0], u[1], u[2]])).filter(|s| s.wi.y > 0.0);
+            drawn.map(|s| s.radiance.g * s.wi.y / s.pdf).fold(0.0, f32::max)
+        };
+        let alone = largest(&|u| emitters.sample_kind(&scene, 0, Vec3::ZERO, Vec3::Y, u));
+        let mixed = largest(&|u| emitters.sample(&scene, Vec3::ZERO, Vec3::Y, u));
+        assert!(alone < 2.0 * exact, "{alone} {exact}");
+        assert!(mixed > 4.0 * exact, "{mixed} {exact}: then kinds are of no use");
     }
 
     #[test]
