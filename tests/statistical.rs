@@ -12,7 +12,7 @@ use raytrace::{DiffuseMode, Film, Settings};
 use support::blocks::ALARM;
 use support::build::{Build, camera};
 use support::files::asset;
-use support::picture::{hybrid, path, shoot, shoot_with, solve};
+use support::picture::{hybrid, mean, path, shoot, shoot_with, solve};
 use support::solved::area_mean;
 use support::stuff::{glass, lamp, matt, metal};
 
@@ -151,6 +151,27 @@ fn probes_look_through_panes_as_plain_paths_do() {
     // With the same numbers for each pane 3.4 % too much came through.
     let allowed = ALARM * (v + w).sqrt();
     assert!((aided - plain).abs() < allowed && allowed < 0.03 * plain, "{aided}, not {plain}: {allowed}");
+}
+
+/// Rough metal under a lamp and the sky, with a pane between that does not bend or mirror anything: what shadow rays see
+/// through it and what the gloss's own rays see through it are the same light, and count once.
+#[test]
+fn gloss_under_a_pane_is_as_bright_as_without_it() {
+    let under = |panes: &[f32]| {
+        let open = Build::new()
+            .level(0.0, [-1.0, -1.0], [1.0, 1.0], true, &metal(0.8, 0.4))
+            .level(2.0, [-0.5, -0.5], [0.5, 0.5], false, &lamp(10.0))
+            .sky(1.0);
+        let pane = glass(1.0, None);
+        let at = |b: Build, &y: &f32| b.level(y, [-6.0, -6.0], [6.0, 6.0], true, &pane);
+        let world = panes.iter().fold(open, at).world();
+        let eye = camera(Vec3::new(0.3, 0.5, 1.0), Vec3::new(0.0, 0.0, -0.3), 0.6);
+        mean(&shoot(&world, &eye, &Settings { verify: false, ..hybrid(8, 8, 0.05) }))
+    };
+    let (open, one, two) = (under(&[]), under(&[1.0]), under(&[0.8, 1.0]));
+    println!("open {open}, under a pane {one}, under two {two}");
+    // 1.6 times as bright when the pane made them two.
+    assert!((one / open - 1.0).abs() < 0.01 && (two / open - 1.0).abs() < 0.01, "{open} {one} {two}");
 }
 
 /// A dark room beside a bright one, with a gap of 10 cm between: its light is found by one ray in a hundred, and its mean

@@ -42,6 +42,7 @@ pub mod math;
 pub mod mesh;
 pub mod nesting;
 pub mod optics;
+mod outlook;
 pub mod passage;
 pub mod photometry;
 pub mod polygon;

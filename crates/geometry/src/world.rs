@@ -5,8 +5,10 @@ use crate::flights::room_size;
 use crate::math::Vec3;
 use crate::nesting::Nesting;
 use crate::optics::attenuation;
+use crate::outlook::Outlook;
 use crate::surface::straight_through;
 use crate::{Bvh, Hit, Mesh, Ray, Rgb, Scene, Surface, Volume};
+use std::sync::Arc;
 
 /// Shadow rays give up, as if blocked, after so many panes.
 const MAX_LAYERS: usize = 64;
@@ -43,12 +45,17 @@ impl World {
         let diagonal = (bounds.1 - bounds.0).length();
         let scale = room_size(&scene.mesh, &bvh, diagonal);
         let nesting = Nesting::new(&scene);
-        World { bvh, emitters, diagonal, scale, bounds, see_through, nesting, scene }
+        let mut world = World { bvh, emitters, diagonal, scale, bounds, see_through, nesting, scene };
+        let sky = world.scene.sky.as_ref().filter(|sky| !sky.mean().is_black());
+        world.emitters.outlook = sky.and_then(|sky| Outlook::learn(&world, sky)).map(Arc::new);
+        world
     }
 
     /// Gathers anew what shines, after the scene's emissions were changed, and nothing else of it.
     pub fn relight(&mut self) {
+        let outlook = self.emitters.outlook.take();
         self.emitters = Emitters::build(&self.scene);
+        self.emitters.outlook = outlook;
     }
 
     /// The nearest triangle the ray meets.

@@ -241,7 +241,9 @@ impl Caustics {
         }
         let area = elements.vertex_areas();
         let mut irradiance = vec![Rgb::BLACK; 2 * elements.vertices.len()];
-        for photon in self.photons.iter().filter(|p| counts(p)) {
+        // A sliver too thin to have corners of its own may be hit all the same.
+        let known = |p: &&Photon| counts(p) && elements.piece(p.triangle).is_some();
+        for photon in self.photons.iter().filter(known) {
             let (leaf, w) = elements.locate(photon.triangle, photon.uv[0], photon.uv[1]);
             for (v, w) in elements.nodes[leaf as usize].vertices.into_iter().zip(w) {
                 let slot = slot(v, photon.side);
@@ -469,6 +471,7 @@ fn pop_heap(heap: &mut Vec<(f32, u32)>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use geometry::MaterialId;
 
     #[test]
     fn an_even_rain_of_photons_gives_its_irradiance() {
@@ -502,5 +505,33 @@ mod tests {
             / 64.0;
         assert!((mean - 3.0).abs() < 3.0 * (4.9 * 0.016 + 1.0 / 80.0), "{mean}");
         assert_eq!(map.irradiance(Vec3::new(0.5, 0.0, 0.5), Vec3::X), Rgb::BLACK);
+    }
+
+    #[test]
+    fn a_photon_on_a_sliver_without_corners_lands_nowhere() {
+        let mesh = Mesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Z, Vec3::Y, Vec3::ONE, Vec3::Y],
+            normals: vec![Vec3::Y; 6],
+            triangles: vec![[0, 2, 1], [3, 4, 5]],
+            materials: vec![MaterialId(0); 2],
+            ..Mesh::default()
+        };
+        let elements = Elements::new(&mesh);
+        let on = |triangle: u32| Photon {
+            position: Vec3::new(0.2, 0.0, 0.0),
+            normal: Vec3::Y,
+            flux: Rgb::WHITE,
+            triangle,
+            uv: [0.2; 2],
+            side: Side::Front,
+            group: 0,
+        };
+        let at = |photons: Vec<Photon>| {
+            let axes = vec![0; photons.len()];
+            Caustics { photons, axes, reach: 1.0, sent: 1 }.at_vertices(&elements, |_| true)
+        };
+        let flux = |e: Vec<Rgb>| e.iter().map(|e| e.g).sum::<f32>();
+        assert!(flux(at(vec![on(0)])) > 0.0);
+        assert_eq!(flux(at(vec![on(1)])), 0.0);
     }
 }

@@ -101,6 +101,8 @@ pub struct Field {
     parents: HashMap<VertexId, [VertexId; 2]>,
     /// Sites that `sources` know of.
     connected: usize,
+    /// For each slot, the squared distance within which a new site would change its source.
+    reach: Vec<f32>,
 }
 
 /// Lift of a line between two vertices, in units of its length: where their normals agree, and for each unit between these,
@@ -167,39 +169,45 @@ impl Field {
     /// nothing changes.
     pub fn connect(&mut self, world: &World, elements: &Elements, radius: f32) {
         let vertices = &elements.vertices;
-        let mut grids = [Grid::new(radius), Grid::new(radius)];
+        let grids = || [Grid::new(radius), Grid::new(radius)];
+        let (mut all, mut new) = (grids(), grids());
         // Where a new site may be near, on each side.
         let mut touched = [HashSet::new(), HashSet::new()];
         let mut site_of = vec![u32::MAX; 2 * vertices.len()];
         for (i, site) in self.sites.iter().enumerate() {
             site_of[slot(site.vertex, site.side)] = i as u32;
             if site.row.dead <= BURIED {
-                grids[site.side.index()].insert(vertices, site.vertex);
+                all[site.side.index()].insert(vertices, site.vertex);
                 if i >= self.connected {
+                    new[site.side.index()].insert(vertices, site.vertex);
                     let at = vertices[site.vertex as usize].position;
-                    touched[site.side.index()].extend(grids[0].cells_around(at));
+                    touched[site.side.index()].extend(all[0].cells_around(at));
                 }
             }
         }
         self.connected = self.sites.len();
-        let (sites, before) = (&self.sites, &self.sources.0);
-        let stays = |s: usize| {
-            before.get(s).filter(|_| !touched[s % 2].contains(&grids[0].cell(vertices[s / 2].position)))
-        };
-        let sources = (0..site_of.len())
-            .into_par_iter()
-            .map(|s| {
-                let (v, side) = ((s / 2) as VertexId, Side::BOTH[s % 2]);
-                match site_of[s] {
-                    u32::MAX if self.parents.contains_key(&v) => Source::Nothing, // see below
-                    u32::MAX => stays(s)
-                        .copied()
-                        .unwrap_or_else(|| near(world, vertices, &grids[s % 2], &site_of, v, side)),
-                    i if sites[i as usize].row.dead > BURIED => Source::Nothing,
-                    i => Source::Site(i),
+        let known = |s: usize| self.reach.get(s).map(|&reach| (self.sources.0[s], reach));
+        let of = |s: usize| {
+            let (v, side) = ((s / 2) as VertexId, Side::BOTH[s % 2]);
+            match site_of[s] {
+                u32::MAX if self.parents.contains_key(&v) => (Source::Nothing, 0.0), // see below
+                u32::MAX => {
+                    let at = &vertices[s / 2];
+                    let nearer = |reach: f32| {
+                        touched[s % 2].contains(&all[0].cell(at.position))
+                            && new[s % 2].near(vertices, at).any(|n| n.1 <= reach)
+                    };
+                    match known(s) {
+                        Some((source, reach)) if !nearer(reach) => (source, reach),
+                        _ => near(world, vertices, &all[s % 2], &site_of, v, side),
+                    }
                 }
-            })
-            .collect();
+                i if self.sites[i as usize].row.dead > BURIED => (Source::Nothing, 0.0),
+                i => (Source::Site(i), 0.0),
+            }
+        };
+        let (sources, reach) = (0..site_of.len()).into_par_iter().map(of).unzip();
+        self.reach = reach;
         self.sources = Sources(sources);
         for (s, &site) in site_of.iter().enumerate() {
             let Some(ends) = self.parents.get(&((s / 2) as VertexId)) else { continue };
@@ -217,8 +225,15 @@ impl Field {
 }
 
 /// Up to four of the sites near `v`, those that it can see, by inverse distance (Franke and Little's weights, which
-/// fall to zero at the edge of the search so that the choice of four leaves no jump).
-fn near(world: &World, vertices: &[Vertex], grid: &Grid, site_of: &[u32], v: VertexId, side: Side) -> Source {
+/// fall to zero at the edge of the search so that the choice of four leaves no jump); and the edge of the search, squared.
+fn near(
+    world: &World,
+    vertices: &[Vertex],
+    grid: &Grid,
+    site_of: &[u32],
+    v: VertexId,
+    side: Side,
+) -> (Source, f32) {
     let at = &vertices[v as usize];
     let mut best = [(f32::INFINITY, VertexId::MAX); 5];
     for (other, d2) in grid.near(vertices, at) {
@@ -227,7 +242,8 @@ fn near(world: &World, vertices: &[Vertex], grid: &Grid, site_of: &[u32], v: Ver
             best.sort_by(|a, b| a.partial_cmp(b).expect("distances are numbers"));
         }
     }
-    let edge = best[4].0.min(1.0).sqrt();
+    let reach = best[4].0.min(1.0);
+    let edge = reach.sqrt();
     let (mut sites, mut weights) = ([0; 4], [0.0; 4]);
     for (k, &(d2, other)) in best[..4].iter().enumerate() {
         if other == VertexId::MAX || !sees(world, at, &vertices[other as usize], side) {
@@ -239,9 +255,9 @@ fn near(world: &World, vertices: &[Vertex], grid: &Grid, site_of: &[u32], v: Ver
     }
     let sum: f32 = weights.iter().sum();
     if sum <= 0.0 {
-        return Source::Nothing;
+        return (Source::Nothing, reach);
     }
-    Source::Near(sites, weights.map(|w| w / sum))
+    (Source::Near(sites, weights.map(|w| w / sum)), reach)
 }
 
 /// Whether nothing stands between two vertices. The line is lifted by some of its length, more where the surface is

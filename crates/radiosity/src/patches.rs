@@ -223,7 +223,8 @@ impl Patches {
                     let (s, t) = sampling::triangle(pattern.point(k, on));
                     let (position, _) = self.point(patch, [s, t]);
                     let u = pattern.point(k * 7 + 3, of).to_array();
-                    let Some(l) = world.emitters.sample_light(&world.scene, light, position, u) else {
+                    let Some(l) = world.emitters.sample_light(&world.scene, light, position, normal, u)
+                    else {
                         continue;
                     };
                     let cos = l.wi.dot(normal);

@@ -121,19 +121,13 @@ impl Plan {
     }
 
     /// As [`Plan::density`], toward the sky.
-    pub fn density_sky(&self, world: &World, wi: Vec3) -> f32 {
-        let lights = world.emitters.lights().iter().enumerate();
-        lights
-            .filter_map(|(l, kind)| {
-                if let EmitterKind::Sky(sky) = kind { Some(self.times(l as u32) * sky.pdf(wi)) } else { None }
-            })
-            .sum()
-    }
-
-    /// Expected samples that `light` gets.
-    fn times(&self, light: u32) -> f32 {
-        let entry = self.entries.iter().find(|e| e.group == Group::Light(light));
-        entry.map_or(0.0, |e| e.samples as f32 * e.chance)
+    pub fn density_sky(&self, world: &World, p: Vec3, n: Vec3, wi: Vec3) -> f32 {
+        let of = |e: &Entry| match e.group {
+            Group::Light(light) => e.samples as f32 * e.chance * world.emitters.pdf_of_sky(light, p, n, wi),
+            Group::Branch(_) => 0.0,
+        };
+        // The sky, when there is one, is the last light.
+        self.entries.last().map_or(0.0, of)
     }
 }
 
@@ -217,7 +211,7 @@ pub fn direct(
                 let punctual = matches!(kind, EmitterKind::Punctual(_));
                 part.hard = punctual;
                 let samples = if punctual { spend.places.len() as u32 } else { samples };
-                let Some(seen) = world.emitters.seen_from(light, p) else { continue };
+                let Some(seen) = world.emitters.seen_from(light, p, n) else { continue };
                 add(&mut part, samples, &|u| seen.sample(&world.scene, u));
             }
             Group::Branch(_) => {

@@ -168,6 +168,11 @@ pub struct Seen<'a> {
 }
 
 impl Seen<'_> {
+    /// The polygon itself.
+    pub fn shape(&self) -> &PolygonLight {
+        self.light
+    }
+
     /// See [`PolygonLight::sample`].
     pub fn sample(&self, u: [f32; 2]) -> Option<(Vec3, f32)> {
         let Some(fan) = &self.fan else {

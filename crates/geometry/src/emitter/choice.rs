@@ -1,8 +1,8 @@
 //! Which light for which point, and how likely: the density of the whole draw.
 
 use super::{EmitterKind, Emitters, LightSample};
-use crate::math::{Vec2, Vec3, to_world};
-use crate::{Scene, Sky, sampling};
+use crate::Scene;
+use crate::math::Vec3;
 
 /// Lights from infinitely far that are asked one by one at most, for each costs a shadow ray: a sky, a sun, and one to spare.
 const MANY: u32 = 3;
@@ -57,21 +57,7 @@ impl Emitters {
         n: Vec3,
         u: [f32; 2],
     ) -> Option<LightSample> {
-        let s = match (&self.lights[light as usize], n != Vec3::ZERO) {
-            (EmitterKind::Sky(Sky::Constant(radiance)), true) => {
-                let wi = to_world(sampling::cosine_hemisphere(Vec2::from(u)), n);
-                let pdf = sampling::cosine_hemisphere_pdf_solid_angle(wi.dot(n));
-                (pdf > 0.0).then_some(LightSample {
-                    wi,
-                    distance: f32::INFINITY,
-                    radiance: *radiance,
-                    pdf,
-                    delta: false,
-                    light,
-                })
-            }
-            _ => self.sample_light(scene, light, p, u),
-        };
+        let s = self.sample_light(scene, light, p, n, u);
         s.map(|s| LightSample { pdf: s.pdf * probability, ..s }).filter(|s| s.pdf > 0.0)
     }
 
@@ -89,15 +75,9 @@ impl Emitters {
     }
 
     /// The density (1/sr) with which [`Emitters::sample`] draws the sky in the unit direction `wi`.
-    pub fn pdf_sky(&self, n: Vec3, wi: Vec3) -> f32 {
+    pub fn pdf_sky(&self, p: Vec3, n: Vec3, wi: Vec3) -> f32 {
         // The sky, when there is one, is the last light.
-        match (self.lights.last(), self.far.last()) {
-            (Some(EmitterKind::Sky(Sky::Constant(_))), Some((_, share))) if n != Vec3::ZERO => {
-                share * sampling::cosine_hemisphere_pdf_solid_angle(wi.dot(n))
-            }
-            (Some(EmitterKind::Sky(sky)), Some((_, share))) => share * sky.pdf(wi),
-            _ => 0.0,
-        }
+        self.far.last().map_or(0.0, |&(light, share)| share * self.pdf_of_sky(light, p, n, wi))
     }
 
     /// A light for `p`, and the probability of that choice.
@@ -126,11 +106,11 @@ impl Emitters {
 mod tests {
     use super::*;
     use crate::emitter::testing::*;
-    use crate::math::Affine2;
+    use crate::math::{Affine2, Vec2};
     use crate::polygon::polygon_irradiance;
     use crate::scene::{Light, LightKind};
     use crate::texture::Wrap;
-    use crate::{Mesh, Rgb, Texture, TextureRef};
+    use crate::{Mesh, Rgb, Sky, Texture, TextureRef};
     use std::f32::consts::PI;
 
     /// Unshadowed irradiance by quasi-random draws; each carries the density that is told of it.
@@ -148,7 +128,7 @@ mod tests {
                 assert!((density / s.pdf - 1.0).abs() < 1e-3);
             }
             if s.distance.is_infinite() && !s.delta {
-                assert!((emitters.pdf_sky(n, s.wi) / s.pdf - 1.0).abs() < 1e-3);
+                assert!((emitters.pdf_sky(p, n, s.wi) / s.pdf - 1.0).abs() < 1e-3);
             }
             sum += (s.radiance.g * s.wi.dot(n).max(0.0) / s.pdf) as f64;
         }

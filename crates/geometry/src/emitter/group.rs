@@ -43,10 +43,10 @@ impl Emitters {
         u: [f32; 2],
     ) -> Option<LightSample> {
         match group {
-            Group::Light(light) => self.sample_light(scene, light, p, u),
+            Group::Light(light) => self.sample_light(scene, light, p, n, u),
             Group::Branch(node) => {
                 let (light, probability, rest) = self.tree.choose_below(node, p, n, u[0])?;
-                let s = self.sample_light(scene, light, p, [rest, u[1]])?;
+                let s = self.sample_light(scene, light, p, n, [rest, u[1]])?;
                 Some(LightSample { pdf: s.pdf * probability, ..s })
             }
         }

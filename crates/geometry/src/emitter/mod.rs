@@ -10,7 +10,7 @@ mod merge;
 mod punctual;
 mod spherical;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 mod tree;
 
 pub use area::{PolygonLight, Seen};
@@ -20,10 +20,12 @@ pub use merge::MAX_CORNERS;
 pub use punctual::{range_window, spot_falloff};
 
 use crate::math::{Vec3, offset_origin};
+use crate::outlook::{Outlook, SeenSky};
 use crate::scene::Light;
 use crate::surface::{coverage_at, emission_at};
 use crate::{Hit, Ray, Rgb, Scene, Sky};
 use std::f32::consts::PI;
+use std::sync::Arc;
 use tree::LightTree;
 
 /// All that shines in a scene. Unlit materials show but do not shine.
@@ -47,6 +49,8 @@ pub struct Emitters {
     centre: Vec3,
     /// Its radius, m.
     radius: f32,
+    /// Through which windows the sky is seen, where that is known.
+    pub(crate) outlook: Option<Arc<Outlook>>,
 }
 
 const NO_LIGHT: u32 = u32::MAX;
@@ -137,21 +141,42 @@ impl Emitters {
         &self.power
     }
 
-    /// One light as `p` sees it; `None` where a surface sends no light there.
+    /// One light as `p` sees it, on a surface of unit normal `n` or from all sides with a zero one; `None` where a lamp's
+    /// surface sends no light there.
     #[inline]
-    pub fn seen_from(&self, light: u32, p: Vec3) -> Option<SeenLight<'_>> {
-        let kind = self.lights.get(light as usize)?;
-        let surface = match kind {
-            EmitterKind::Polygon(shape) | EmitterKind::Textured(shape) => Some(shape.seen_from(p)?),
-            _ => None,
+    pub fn seen_from(&self, light: u32, p: Vec3, n: Vec3) -> Option<SeenLight<'_>> {
+        let way = match self.lights.get(light as usize)? {
+            EmitterKind::Polygon(shape) => Way::Surface(shape.seen_from(p)?, false),
+            EmitterKind::Textured(shape) => Way::Surface(shape.seen_from(p)?, true),
+            EmitterKind::Punctual(lamp) => Way::Lamp(lamp),
+            EmitterKind::Sky(sky) => Way::Sky(self.seen_sky(sky, p, n)),
         };
-        Some(SeenLight { kind, light, p, surface })
+        Some(SeenLight { way, light, p })
     }
 
-    /// A way from `p` to one given light, the pdf without the probability of choosing that light; `u` in [0, 1)².
-    /// `None` where it sends no light.
-    pub fn sample_light(&self, scene: &Scene, light: u32, p: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        self.seen_from(light, p)?.sample(scene, u)
+    fn seen_sky<'a>(&'a self, sky: &'a Sky, p: Vec3, n: Vec3) -> SeenSky<'a> {
+        SeenSky::new(sky, self.outlook.as_deref(), p, n)
+    }
+
+    /// A way from `p` with unit normal `n`, or zero, to one given light, the pdf without the probability of choosing that
+    /// light; `u` in [0, 1)². `None` where it sends no light.
+    pub fn sample_light(
+        &self,
+        scene: &Scene,
+        light: u32,
+        p: Vec3,
+        n: Vec3,
+        u: [f32; 2],
+    ) -> Option<LightSample> {
+        self.seen_from(light, p, n)?.sample(scene, u)
+    }
+
+    /// The density (1/sr) with which [`Emitters::sample_light`] draws the unit direction `wi` of the sky, if `light` is one.
+    pub fn pdf_of_sky(&self, light: u32, p: Vec3, n: Vec3, wi: Vec3) -> f32 {
+        match self.lights.get(light as usize) {
+            Some(EmitterKind::Sky(sky)) => self.seen_sky(sky, p, n).pdf(wi),
+            _ => 0.0,
+        }
     }
 
     /// About the irradiance (mean of the channels, lx) that one light throws on `p` with unit normal `n` if nothing
@@ -173,10 +198,17 @@ impl Emitters {
 /// One light as one point sees it: what all samples toward it share.
 #[derive(Clone, Debug)]
 pub struct SeenLight<'a> {
-    kind: &'a EmitterKind,
+    way: Way<'a>,
     light: u32,
     p: Vec3,
-    surface: Option<Seen<'a>>,
+}
+
+#[derive(Clone, Debug)]
+enum Way<'a> {
+    /// Whether a texture varies its radiance.
+    Surface(Seen<'a>, bool),
+    Lamp(&'a Light),
+    Sky(SeenSky<'a>),
 }
 
 impl SeenLight<'_> {
@@ -184,13 +216,14 @@ impl SeenLight<'_> {
     #[inline]
     pub fn sample(&self, scene: &Scene, u: [f32; 2]) -> Option<LightSample> {
         let SeenLight { light, p, .. } = *self;
-        match (self.kind, &self.surface) {
-            (EmitterKind::Polygon(shape) | EmitterKind::Textured(shape), Some(seen)) => {
+        match &self.way {
+            Way::Surface(seen, textured) => {
                 let (point, pdf) = seen.sample(u)?;
                 let way = point - p;
                 let distance = way.length();
                 let wi = way / distance;
-                let radiance = if let EmitterKind::Textured(_) = self.kind {
+                let shape = seen.shape();
+                let radiance = if *textured {
                     let hit = hit_at(scene, shape.triangles[0], point, distance);
                     shone_at(scene, &hit, wi.dot(shape.normal) < 0.0)
                 } else {
@@ -198,11 +231,11 @@ impl SeenLight<'_> {
                 };
                 Some(LightSample { wi, distance, radiance, pdf, delta: false, light })
             }
-            (EmitterKind::Punctual(lamp), _) => {
+            Way::Lamp(lamp) => {
                 let (wi, distance, radiance) = lamp.reaching(p)?;
                 Some(LightSample { wi, distance, radiance, pdf: 1.0, delta: true, light })
             }
-            (EmitterKind::Sky(sky), _) => {
+            Way::Sky(sky) => {
                 let s = sky.sample(u);
                 let usable = s.pdf > 0.0 && s.pdf.is_finite();
                 usable.then_some(LightSample {
@@ -214,7 +247,6 @@ impl SeenLight<'_> {
                     light,
                 })
             }
-            (EmitterKind::Polygon(_) | EmitterKind::Textured(_), None) => None,
         }
     }
 }

@@ -330,7 +330,16 @@ impl Hybrid<'_> {
     /// one for a glossy one.
     ///
     /// - `plan`: the lights that shadow rays at `surface` looked for.
-    fn specular(&self, surface: &Surface, wo: Vec3, plan: &Plan, strand: Strand, rng: &mut Rng) -> Rgb {
+    /// - `before`: where the glossy ray came from that met `surface`, if one did: it goes on straight through a pane.
+    fn specular(
+        &self,
+        surface: &Surface,
+        wo: Vec3,
+        plan: &Plan,
+        strand: Strand,
+        before: Option<&From>,
+        rng: &mut Rng,
+    ) -> Rgb {
         let beyond = strand.depth >= DEEPEST;
         if !surface.bsdf.has_specular() || beyond || !quasi_diffuse(surface, wo).is_black() {
             return Rgb::BLACK;
@@ -346,17 +355,17 @@ impl Hybrid<'_> {
             });
             return self.follow(surface, &next, strand, from.as_ref(), rng);
         }
+        // What shadow rays saw through the pane counts but once.
+        let onward = |next: &BsdfSample, rng: &mut Rng| {
+            self.follow(surface, next, strand, before.filter(|_| next.straight), rng)
+        };
         if strand.depth < BRANCHING {
             let lobes = surface.bsdf.delta_lobes(wo);
-            return lobes
-                .into_iter()
-                .flatten()
-                .map(|next| self.follow(surface, &next, strand, None, rng))
-                .sum();
+            return lobes.into_iter().flatten().map(|next| onward(&next, rng)).sum();
         }
         let u = [rng.f32(), rng.f32(), rng.f32()];
         match surface.bsdf.sample_specular(wo, u) {
-            Some(next) => self.follow(surface, &next, strand, None, rng),
+            Some(next) => onward(&next, rng),
             None => Rgb::BLACK,
         }
     }
@@ -393,7 +402,10 @@ impl Hybrid<'_> {
     fn incoming(&self, ray: Ray, mut strand: Strand, from: Option<&From>, rng: &mut Rng) -> Rgb {
         let Some(hit) = self.world.closest(&ray) else {
             let Some(sky) = &self.world.scene.sky else { return Rgb::BLACK };
-            let share = from.map_or(1.0, |f| f.pdf / (f.pdf + f.plan.density_sky(self.world, ray.direction)));
+            let share = from.map_or(1.0, |f| {
+                let by_light = f.plan.density_sky(self.world, f.position, f.normal, ray.direction);
+                f.pdf / (f.pdf + by_light)
+            });
             return sky.radiance(ray.direction) * share;
         };
         let mut surface = self.world.surface(&ray, &hit);
@@ -415,14 +427,21 @@ impl Hybrid<'_> {
                 }
                 _ => 1.0,
             };
-            let here = surface.emission * share + self.surface(&surface, -ray.direction, strand, rng);
+            let here = surface.emission * share + self.surface(&surface, -ray.direction, strand, from, rng);
             sum += here * surface.coverage;
         }
         left * sum
     }
 
     /// Light that a surface met by a specular ray sends back, its own emission left out.
-    fn surface(&self, surface: &Surface, wo: Vec3, strand: Strand, rng: &mut Rng) -> Rgb {
+    fn surface(
+        &self,
+        surface: &Surface,
+        wo: Vec3,
+        strand: Strand,
+        from: Option<&From>,
+        rng: &mut Rng,
+    ) -> Rgb {
         if let Some(shown) = surface.unlit {
             return shown;
         }
@@ -441,7 +460,8 @@ impl Hybrid<'_> {
         let here = Start::at(surface.position);
         let (diffuse, plan) =
             self.diffuse(surface, wo, Quality { shadow, gather, photons }, phase, &[here], rng);
-        diffuse.direct + diffuse.indirect + diffuse.glossy + self.specular(surface, wo, &plan, strand, rng)
+        let specular = self.specular(surface, wo, &plan, strand, from, rng);
+        diffuse.direct + diffuse.indirect + diffuse.glossy + specular
     }
 
     /// What the eye gets of one primary surface besides its diffuse part: emission as such, and the ray tree.
@@ -462,7 +482,7 @@ impl Hybrid<'_> {
         } else {
             let strand = Strand::one_of(times);
             out.specular = match surface.disperses() {
-                false => self.specular(surface, wo, plan, strand, rng),
+                false => self.specular(surface, wo, plan, strand, None, rng),
                 true => self.rainbow(surface, wo, plan, strand, rng),
             };
         }
@@ -484,7 +504,7 @@ impl Hybrid<'_> {
         let mut of = |channel| {
             let (mut surface, mut strand) = (surface.clone(), strand);
             let mask = strand.passage.part(&mut surface, Hue::of_channel(channel, rng.f32()));
-            mask * self.specular(&surface, wo, plan, strand, rng)
+            mask * self.specular(&surface, wo, plan, strand, None, rng)
         };
         of(0) + of(1) + of(2)
     }

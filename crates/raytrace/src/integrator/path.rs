@@ -259,7 +259,7 @@ impl<'a> Path<'a> {
     fn escape(&mut self) {
         if let Some(sky) = &self.world.scene.sky {
             let d = self.ray.direction;
-            let weight = self.weight(|_, n| self.world.emitters.pdf_sky(n, d));
+            let weight = self.weight(|p, n| self.world.emitters.pdf_sky(p, n, d));
             self.add(sky.radiance(d), weight);
         }
     }
