@@ -17,16 +17,18 @@ use std::f32::consts::{PI, TAU};
 const FLIGHTS: usize = 1 << 16;
 /// Rays from each. With 16 the picture of an office behind blinds took 1.7 times as many rays for its noise.
 const RAYS: u32 = 64;
-/// Places that share what they saw, at most; at least half as many.
+/// Places that share what they saw, at most; at least half as many. With 256, and 16 rays from each, two rooms by day took as
+/// many rays, to a twentieth.
 const TOGETHER: usize = 96;
-/// Rays that must have got out for the places to know their windows.
+/// Rays that must have got out for the places to know their windows. With 16 of them, and 8 rays from each place, a picture of
+/// a room by day kept 5.8 % of noise; with 4, and 16 rays, 3.8 %.
 const FEW: u32 = 4;
-/// Parts of the sphere, all of one solid angle: at 24 by 48 their counts are too few, a tenth more shadow rays. Rows of equal
-/// height along y, columns around it.
+/// Parts of the sphere, all of one solid angle: at 24 by 48 their counts are too few, and the picture takes a tenth more rays. Rows of
+/// equal height along y, columns around it.
 const ROWS: usize = 16;
 const COLUMNS: usize = 32;
 const PARTS: usize = ROWS * COLUMNS;
-/// Share of the plain draw, at least: what lies beside the known windows counts up to so many times less often.
+/// Share of the plain draw, at least: what comes from beside the known windows has at most 1/0.15 times its second moment.
 const PLAIN: f32 = 0.15;
 /// The same at most: of a panorama with a sun in it most of the light lies in a point that parts cannot tell.
 const MOST_PLAIN: f32 = 0.7;
@@ -316,8 +318,8 @@ mod tests {
     use crate::polygon::polygon_irradiance;
     use crate::{Material, MaterialId, Mesh, Rgb, Scene};
 
-    /// A room of 4 × 3 × 4 m, open where x = 4, 1 < y < 2, 1 < z < 2, under `sky`.
-    fn room(sky: Sky) -> World {
+    /// A room of 4 × 3 × 4 m under `sky`, with a window where x = 4, 1 < y < 2, 1 < z < 2, or without.
+    fn room(sky: Sky, open: bool) -> World {
         let mut mesh = Mesh::default();
         let mut quad = |o: [f32; 3], u: [f32; 3], v: [f32; 3]| {
             let (o, u, v) = (Vec3::from(o), Vec3::from(u), Vec3::from(v));
@@ -335,6 +337,9 @@ mod tests {
             [(0.0, 0.0, 1.0, 4.0), (2.0, 0.0, 1.0, 4.0), (1.0, 0.0, 1.0, 1.0), (1.0, 2.0, 1.0, 2.0)]
         {
             quad([4.0, y, z], [0.0, 0.0, w], [0.0, h, 0.0]);
+        }
+        if !open {
+            quad([4.0, 1.0, 1.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]);
         }
         mesh.materials = vec![MaterialId(0); mesh.triangles.len()];
         World::new(Scene { mesh, materials: vec![Material::default()], sky: Some(sky), ..Scene::default() })
@@ -368,7 +373,7 @@ mod tests {
         ];
         let window = [[4.0, 1.0, 1.0], [4.0, 1.0, 2.0], [4.0, 2.0, 2.0], [4.0, 2.0, 1.0]].map(Vec3::from);
         for (sky, even) in skies {
-            let world = room(sky);
+            let world = room(sky, true);
             assert!(world.emitters.outlook.is_some());
             for (p, n) in
                 [([0.0, 1.6, 1.2], Vec3::X), ([2.5, 0.0, 1.5], Vec3::Y), ([1.0, 0.7, 4.0], Vec3::NEG_Z)]
@@ -381,18 +386,22 @@ mod tests {
                     assert!((e / exact - 1.0).abs() < 1e-3, "{p}: {e} {exact}");
                 }
                 assert!((e / plain - 1.0).abs() < 0.01, "{p}: {e} {plain}");
-                // 16 times and more, measured.
+                // 16 times and more, measured with 16 rays from each place.
                 assert!(10.0 * variance < plain_variance, "{p}: {variance} {plain_variance}");
             }
         }
     }
 
     #[test]
-    fn what_sees_no_sky_has_no_view_and_what_sees_all_of_it_loses_nothing() {
-        let world = room(Sky::Constant(Rgb::WHITE));
-        // The roof's upper side: nothing is asked there, or all of the sky is seen.
+    fn a_roof_that_goes_by_the_windows_below_it_gets_all_of_the_sky() {
+        let world = room(Sky::Constant(Rgb::WHITE), true);
         let (e, _) = irradiance(&world, Vec3::new(2.0, 3.0, 2.0), Vec3::Y, true, 40_000);
         assert!((e / PI - 1.0).abs() < 0.01, "{e}");
+    }
+
+    #[test]
+    fn without_a_window_there_is_nothing_to_know() {
+        assert!(room(Sky::Constant(Rgb::WHITE), false).emitters.outlook.is_none());
         assert!(World::new(Scene::default()).emitters.outlook.is_none());
     }
 }

@@ -23,6 +23,7 @@ pub(crate) fn first_mesh(world: &World, h0: f32, most: usize) -> (Elements, f32)
     let triangles = elements.leaves().count();
     let area: f32 = (0..mesh.triangles.len() as u32).map(|t| mesh.area(t)).sum();
     let mut longest = h0.max((area / ELEMENTS).sqrt());
+    // By the root: the ground outside has all the area, the furniture all the triangles.
     let looks = if longest > h0 { flights(mesh, &world.bvh, LOOKS, 0.5) } else { Vec::new() };
     let large = LARGE * quartile(&looks);
     if !elements.leaves().any(|leaf| elements.longest_edge(leaf) > large.max(longest)) {

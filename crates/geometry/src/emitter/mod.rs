@@ -145,13 +145,13 @@ impl Emitters {
     /// surface sends no light there.
     #[inline]
     pub fn seen_from(&self, light: u32, p: Vec3, n: Vec3) -> Option<SeenLight<'_>> {
-        let way = match self.lights.get(light as usize)? {
-            EmitterKind::Polygon(shape) => Way::Surface(shape.seen_from(p)?, false),
-            EmitterKind::Textured(shape) => Way::Surface(shape.seen_from(p)?, true),
-            EmitterKind::Punctual(lamp) => Way::Lamp(lamp),
-            EmitterKind::Sky(sky) => Way::Sky(self.seen_sky(sky, p, n)),
+        let kind = match self.lights.get(light as usize)? {
+            EmitterKind::Polygon(shape) => SeenKind::Surface(shape.seen_from(p)?, false),
+            EmitterKind::Textured(shape) => SeenKind::Surface(shape.seen_from(p)?, true),
+            EmitterKind::Punctual(lamp) => SeenKind::Lamp(lamp),
+            EmitterKind::Sky(sky) => SeenKind::Sky(self.seen_sky(sky, p, n)),
         };
-        Some(SeenLight { way, light, p })
+        Some(SeenLight { kind, light, p })
     }
 
     fn seen_sky<'a>(&'a self, sky: &'a Sky, p: Vec3, n: Vec3) -> SeenSky<'a> {
@@ -198,13 +198,13 @@ impl Emitters {
 /// One light as one point sees it: what all samples toward it share.
 #[derive(Clone, Debug)]
 pub struct SeenLight<'a> {
-    way: Way<'a>,
+    kind: SeenKind<'a>,
     light: u32,
     p: Vec3,
 }
 
 #[derive(Clone, Debug)]
-enum Way<'a> {
+enum SeenKind<'a> {
     /// Whether a texture varies its radiance.
     Surface(Seen<'a>, bool),
     Lamp(&'a Light),
@@ -216,8 +216,8 @@ impl SeenLight<'_> {
     #[inline]
     pub fn sample(&self, scene: &Scene, u: [f32; 2]) -> Option<LightSample> {
         let SeenLight { light, p, .. } = *self;
-        match &self.way {
-            Way::Surface(seen, textured) => {
+        match &self.kind {
+            SeenKind::Surface(seen, textured) => {
                 let (point, pdf) = seen.sample(u)?;
                 let way = point - p;
                 let distance = way.length();
@@ -231,11 +231,11 @@ impl SeenLight<'_> {
                 };
                 Some(LightSample { wi, distance, radiance, pdf, delta: false, light })
             }
-            Way::Lamp(lamp) => {
+            SeenKind::Lamp(lamp) => {
                 let (wi, distance, radiance) = lamp.reaching(p)?;
                 Some(LightSample { wi, distance, radiance, pdf: 1.0, delta: true, light })
             }
-            Way::Sky(sky) => {
+            SeenKind::Sky(sky) => {
                 let s = sky.sample(u);
                 let usable = s.pdf > 0.0 && s.pdf.is_finite();
                 usable.then_some(LightSample {
