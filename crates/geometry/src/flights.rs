@@ -23,6 +23,14 @@ pub struct Flight {
 }
 
 impl Flight {
+    /// Where it ended, with the unit normal there toward where it came from.
+    pub(crate) fn end(&self, mesh: &Mesh) -> (Vec3, Vec3) {
+        let Hit { triangle, u, v, .. } = self.hit;
+        let n = mesh.geometric_normal(triangle);
+        let n = if n.dot(self.direction) > 0.0 { -n } else { n };
+        (mesh.interpolate(triangle, u, v, &mesh.positions), n)
+    }
+
     /// Whether it is not from the back of one face to the back of another, which is inside of things.
     pub(crate) fn is_outside(&self, mesh: &Mesh) -> bool {
         self.front || mesh.geometric_normal(self.hit.triangle).dot(self.direction) <= 0.0

@@ -5,11 +5,11 @@
 //! that what no ray found is found too: unbiased whatever the rays saw (Veach and Guibas, SIGGRAPH 1995, on mixtures; the
 //! learning of visibility as in Müller, Gross and Novák, "Practical Path Guiding", EGSR 2017, but of the sky alone).
 
-use crate::flights::{Flight, flights};
+use crate::flights::flights;
 use crate::math::{Vec2, Vec3, offset_origin, to_world};
 use crate::sampling::{self, Rng};
 use crate::sky::{Sky, SkySample};
-use crate::{Hit, Ray, World};
+use crate::{Ray, World};
 use rayon::prelude::*;
 use std::f32::consts::{PI, TAU};
 
@@ -17,19 +17,23 @@ use std::f32::consts::{PI, TAU};
 const FLIGHTS: usize = 1 << 16;
 /// Rays from each. With 16 the picture of an office behind blinds took 1.7 times as many rays for its noise.
 const RAYS: u32 = 64;
-/// Places that share what they saw, at most; at least half as many. With 256, and 16 rays from each, two rooms by day took as
-/// many rays, to a twentieth.
-const TOGETHER: usize = 96;
-/// Rays that must have got out for the places to know their windows. With 16 of them, and 8 rays from each place, a picture of
-/// a room by day kept 5.8 % of noise; with 4, and 16 rays, 3.8 %.
-const FEW: u32 = 4;
+/// The same where the windows are roughly known. Pictures of three rooms by day take as many rays with 64.
+const RAYS_MORE: u32 = 32;
+/// Places that share what they saw, at most; at least half as many. With twice as many, those pictures take 3 % more rays.
+const TOGETHER: usize = 64;
+/// What all places around see counts as so many rays that got out: it is all that is known in a niche from which no ray did.
+/// With 128 a tenth more rays, with 512 a third; with 8 as many.
+const AROUND: f32 = 16.0;
 /// Parts of the sphere, all of one solid angle: at 24 by 48 their counts are too few, and the picture takes a tenth more rays. Rows of
 /// equal height along y, columns around it.
 const ROWS: usize = 16;
 const COLUMNS: usize = 32;
 const PARTS: usize = ROWS * COLUMNS;
-/// Share of the plain draw, at least: what comes from beside the known windows has at most 1/0.15 times its second moment.
-const PLAIN: f32 = 0.15;
+/// A number for each part.
+type Parts = [f32; PARTS];
+/// Share of the plain draw, at least: what comes from beside the known windows has at most 1/0.08 times its second moment. With
+/// 0.15 a tenth more rays.
+const PLAIN: f32 = 0.08;
 /// The same at most: of a panorama with a sun in it most of the light lies in a point that parts cannot tell.
 const MOST_PLAIN: f32 = 0.7;
 /// Looks along each edge of a part.
@@ -39,7 +43,9 @@ const SPARKLE: f32 = 4.0;
 
 /// Which windows every place has.
 #[derive(Debug)]
-pub(crate) struct Outlook {
+pub struct Outlook {
+    /// All that were asked.
+    places: Vec<Place>,
     /// Inner nodes of trees over places; children are nodes, or views with the top bit set.
     nodes: Vec<Node>,
     /// For each way that a surface mostly faces ([`facing`]): the inside of a wall has nothing in common with its outside.
@@ -68,7 +74,9 @@ struct View {
     columns: [[f32; COLUMNS + 1]; ROWS],
 }
 
-/// A place that was asked, and the parts in which its rays got out, with the light that came through.
+/// A place that was asked, and the parts in which its rays got out, with the share of an even sky's irradiance (without
+/// anything between) that each stands for.
+#[derive(Clone, Debug)]
 struct Place {
     at: Vec3,
     facing: usize,
@@ -79,44 +87,48 @@ impl Outlook {
     /// Learns what of `sky` the surfaces of `world` see; `None` where nothing does.
     pub(crate) fn learn(world: &World, sky: &Sky) -> Option<Outlook> {
         let mesh = &world.scene.mesh;
-        let look = |(i, flight): (usize, &Flight)| {
-            let mut rng = Rng::new(0x6f_7574_6c6f_6f6b, i as u64);
-            let Hit { triangle, u, v, .. } = flight.hit;
-            let n = mesh.geometric_normal(triangle);
-            let n = if n.dot(flight.direction) > 0.0 { -n } else { n };
-            let p = mesh.interpolate(triangle, u, v, &mesh.positions);
-            let origin = offset_origin(p, n);
-            let shift = rng.vec2();
-            let out = |k: u32| {
-                // Of a golden sequence, so that few rays look everywhere.
-                let u =
-                    Vec2::new((k as f32 + shift.x) / RAYS as f32, (k as f32 * 0.618_034 + shift.y).fract());
-                let wi = to_world(sampling::cosine_hemisphere(u), n);
-                let left = world.transmittance(&Ray::new(origin, wi)).mean();
-                (left > 0.0).then(|| (part(wi) as u16, left))
-            };
-            Place { at: p, facing: facing(n), seen: (0..RAYS).filter_map(out).collect() }
-        };
         // What is seen from elsewhere, not the outside of walls or the inside of things.
         let all = flights(mesh, &world.bvh, FLIGHTS, 0.75);
-        let exposed: Vec<&Flight> = all.iter().filter(|f| f.is_outside(mesh)).collect();
-        let places: Vec<Place> =
-            exposed.par_iter().enumerate().map(|(i, flight)| look((i, flight))).collect();
+        let exposed: Vec<(Vec3, Vec3)> =
+            all.iter().filter(|f| f.is_outside(mesh)).map(|f| f.end(mesh)).collect();
+        let places = look(world, &exposed, RAYS, |(_, n), u| {
+            let wi = to_world(sampling::cosine_hemisphere(Vec2::from(u)), n);
+            (wi, sampling::cosine_hemisphere_pdf_solid_angle(wi.dot(n)))
+        });
+        Outlook::over(places, sky)
+    }
+
+    /// The same with what `more` points of surfaces see, each with its unit normal: many of them near one another know their
+    /// windows more closely.
+    pub fn with(&self, world: &World, more: &[(Vec3, Vec3)]) -> Option<Outlook> {
+        let sky = world.scene.sky.as_ref()?;
+        let more = look(world, more, RAYS_MORE, |(p, n), u| {
+            let s = SeenSky::new(sky, Some(self), p, n).sample(u);
+            (s.direction, s.pdf)
+        });
+        Outlook::over([&self.places[..], &more].concat(), sky)
+    }
+
+    /// Of all these places.
+    fn over(places: Vec<Place>, sky: &Sky) -> Option<Outlook> {
         if places.iter().all(|place| place.seen.is_empty()) {
             return None;
         }
         let (light, plain) = brightness(sky);
-        let mut outlook = Outlook { nodes: Vec::new(), roots: [0; 6], views: Vec::new(), plain };
+        let mut outlook =
+            Outlook { places: Vec::new(), nodes: Vec::new(), roots: [0; 6], views: Vec::new(), plain };
         for way in 0..6 {
             let faces = |&i: &u32| places[i as usize].facing == way;
             let mut all: Vec<u32> = (0..places.len() as u32).filter(faces).collect();
-            outlook.roots[way] = outlook.divide(&places, &mut all, &light);
+            outlook.roots[way] = outlook.divide(&places, &mut all, &[0.0; PARTS], &light);
         }
-        Some(outlook)
+        Some(Outlook { places, ..outlook })
     }
 
     /// Builds the tree over `all` of `places`; returns its root.
-    fn divide(&mut self, places: &[Place], all: &mut [u32], light: &[f32; PARTS]) -> u32 {
+    ///
+    /// - `around`: what the places see among which these are, in sum 1 or 0.
+    fn divide(&mut self, places: &[Place], all: &mut [u32], around: &Parts, light: &Parts) -> u32 {
         let of = |i: &u32, axis: usize| places[*i as usize].at[axis];
         let extent = |axis: usize| {
             let range = all.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), i| {
@@ -125,8 +137,9 @@ impl Outlook {
             range.1 - range.0
         };
         let axis = (0..3).max_by(|&a, &b| extent(a).total_cmp(&extent(b)).then(b.cmp(&a))).unwrap_or(0);
+        let seen = seen_from(all.iter().map(|&i| &places[i as usize]), around);
         if all.len() <= TOGETHER || extent(axis) <= 0.0 {
-            self.views.push(View::new(all.iter().map(|&i| &places[i as usize]), light));
+            self.views.push(View::new(&seen, light));
             return VIEW | (self.views.len() as u32 - 1);
         }
         let middle = all.len() / 2;
@@ -135,7 +148,7 @@ impl Outlook {
         let node = self.nodes.len();
         self.nodes.push(Node { axis, at, children: [0; 2] });
         let (low, high) = all.split_at_mut(middle);
-        let children = [self.divide(places, low, light), self.divide(places, high, light)];
+        let children = [low, high].map(|part| self.divide(places, part, &seen, light));
         self.nodes[node].children = children;
         node as u32
     }
@@ -173,7 +186,7 @@ fn direction(x: f32, y: f32) -> Vec3 {
 }
 
 /// How bright the sky is in each part, but for what sparkles; and the share of the plain draw that the rest asks for.
-fn brightness(sky: &Sky) -> ([f32; PARTS], f32) {
+fn brightness(sky: &Sky) -> (Parts, f32) {
     let mut light = [1.0; PARTS];
     if let Sky::Constant(_) = sky {
         return (light, PLAIN);
@@ -193,18 +206,49 @@ fn brightness(sky: &Sky) -> ([f32; PARTS], f32) {
     (light, (1.0 - even / sky.mean().mean().max(1e-30)).clamp(PLAIN, MOST_PLAIN))
 }
 
+/// Shares of the parts in what `places` see, with what is seen `around` them, in sum 1; or 0.
+fn seen_from<'a>(places: impl Iterator<Item = &'a Place>, around: &Parts) -> Parts {
+    let (mut seen, mut count) = ([0.0; PARTS], 0.0);
+    for &(part, share) in places.flat_map(|place| &place.seen) {
+        seen[part as usize] += share;
+        count += 1.0;
+    }
+    let weight = count / seen.iter().sum::<f32>().max(1e-30);
+    for (seen, around) in seen.iter_mut().zip(around) {
+        *seen = weight * *seen + AROUND * around;
+    }
+    let all = seen.iter().sum::<f32>().max(1e-30);
+    seen.map(|part| part / all)
+}
+
+/// What `points`, each with its unit normal, see by so many `rays` each, which `draw` gives, with their densities (1/sr).
+fn look(
+    world: &World,
+    points: &[(Vec3, Vec3)],
+    rays: u32,
+    draw: impl Fn((Vec3, Vec3), [f32; 2]) -> (Vec3, f32) + Sync,
+) -> Vec<Place> {
+    let place = |(i, &(p, n)): (usize, &(Vec3, Vec3))| {
+        let shift = Rng::new(0x6f_7574_6c6f_6f6b, i as u64).vec2();
+        let out = |k: u32| {
+            // Of a golden sequence, so that few rays look everywhere.
+            let u = [(k as f32 + shift.x) / rays as f32, (k as f32 * 0.618_034 + shift.y).fract()];
+            let (wi, pdf) = draw((p, n), u);
+            let cos = wi.dot(n);
+            if cos <= 0.0 || pdf <= 0.0 {
+                return None;
+            }
+            let left = world.transmittance(&Ray::new(offset_origin(p, n), wi)).mean();
+            (left > 0.0).then(|| (part(wi) as u16, left * cos / (PI * pdf * rays as f32)))
+        };
+        Place { at: p, facing: facing(n), seen: (0..rays).filter_map(out).collect() }
+    };
+    points.par_iter().enumerate().map(place).collect()
+}
+
 impl View {
-    /// `None` where hardly any ray got out.
-    fn new<'a>(places: impl Iterator<Item = &'a Place>, light: &[f32; PARTS]) -> Option<View> {
-        let mut seen = [0f32; PARTS];
-        let mut count = 0;
-        for &(part, left) in places.flat_map(|place| &place.seen) {
-            seen[part as usize] += left;
-            count += 1;
-        }
-        if count < FEW {
-            return None;
-        }
+    /// Of places that see the parts in these shares, each as bright as `light`; `None` where they see none.
+    fn new(seen: &Parts, light: &Parts) -> Option<View> {
         // Neighbouring parts are seen from places between those that were asked.
         let around = |row: usize, column: usize| {
             let mut sum = 0.0;
@@ -346,10 +390,15 @@ mod tests {
     }
 
     /// Irradiance at `p` with shadows by `n` draws, and the variance of one; each draw carries the density that is told of it.
-    fn irradiance(world: &World, p: Vec3, n: Vec3, outlook: bool, draws: u32) -> (f32, f32) {
+    fn irradiance<'a>(
+        world: &World,
+        outlook: impl Into<Option<&'a Outlook>>,
+        p: Vec3,
+        n: Vec3,
+        draws: u32,
+    ) -> (f32, f32) {
         let sky = world.scene.sky.as_ref().expect("a sky");
-        let outlook = world.emitters.outlook.as_deref().filter(|_| outlook);
-        let seen = SeenSky::new(sky, outlook, p, n);
+        let seen = SeenSky::new(sky, outlook.into(), p, n);
         let (mut sum, mut square) = (0f64, 0f64);
         for u in points(draws) {
             let s = seen.sample([u[0], u[1]]);
@@ -379,8 +428,8 @@ mod tests {
                 [([0.0, 1.6, 1.2], Vec3::X), ([2.5, 0.0, 1.5], Vec3::Y), ([1.0, 0.7, 4.0], Vec3::NEG_Z)]
             {
                 let p = Vec3::from(p);
-                let (e, variance) = irradiance(&world, p, n, true, 400_000);
-                let (plain, plain_variance) = irradiance(&world, p, n, false, 400_000);
+                let (e, variance) = irradiance(&world, world.emitters.outlook(), p, n, 400_000);
+                let (plain, plain_variance) = irradiance(&world, None, p, n, 400_000);
                 if even {
                     let exact = 3.0 * PI * polygon_irradiance(p, n, &window).abs();
                     assert!((e / exact - 1.0).abs() < 1e-3, "{p}: {e} {exact}");
@@ -393,9 +442,40 @@ mod tests {
     }
 
     #[test]
+    fn a_niche_goes_by_what_is_seen_around_it() {
+        let place = |i: usize, seen| Place { at: Vec3::new(i as f32, 0.0, 0.0), facing: 2, seen };
+        let lit = (0..TOGETHER).map(|i| place(i, vec![(100, 0.01)]));
+        let dark = (TOGETHER..2 * TOGETHER).map(|i| place(i, Vec::new()));
+        let outlook =
+            Outlook::over(lit.chain(dark).collect(), &Sky::Constant(Rgb::WHITE)).expect("one is seen");
+        for x in [0.0, 1.5 * TOGETHER as f32] {
+            let (view, _) = outlook.view(Vec3::new(x, 0.0, 0.0), Vec3::Y).expect("there is a window");
+            // A part, a quarter of it blurred away to each side along rows and columns.
+            let share = view.pdf(100) * 4.0 * PI / PARTS as f32;
+            assert!((share - 0.25).abs() < 1e-3, "{x}: {share}");
+        }
+        assert!(outlook.view(Vec3::ZERO, Vec3::X).is_none());
+    }
+
+    #[test]
+    fn whoever_asks_more_near_by_knows_the_window_better() {
+        let world = room(Sky::Constant(Rgb::splat(3.0)), true);
+        let coarse = world.emitters.outlook().expect("a window");
+        let near =
+            |i: u32| Vec3::new(2.3 + 0.4 * (i % 16) as f32 / 16.0, 0.0, 1.3 + 0.4 * (i / 16) as f32 / 16.0);
+        let places: Vec<_> = (0..256).map(|i| (near(i), Vec3::Y)).collect();
+        let fine = coarse.with(&world, &places).expect("a window");
+        let (p, n) = (Vec3::new(2.5, 0.0, 1.5), Vec3::Y);
+        let by = |outlook| irradiance(&world, outlook, p, n, 400_000);
+        let ((e, variance), (told, more)) = (by(&fine), by(coarse));
+        assert!((e / told - 1.0).abs() < 2e-3, "{e} {told}");
+        assert!(variance < more, "{variance} {more}");
+    }
+
+    #[test]
     fn a_roof_that_goes_by_the_windows_below_it_gets_all_of_the_sky() {
         let world = room(Sky::Constant(Rgb::WHITE), true);
-        let (e, _) = irradiance(&world, Vec3::new(2.0, 3.0, 2.0), Vec3::Y, true, 40_000);
+        let (e, _) = irradiance(&world, world.emitters.outlook(), Vec3::new(2.0, 3.0, 2.0), Vec3::Y, 40_000);
         assert!((e / PI - 1.0).abs() < 0.01, "{e}");
     }
 

@@ -4,9 +4,9 @@
 //! the visible share of it, so a point that sees a whole lamp has no noise at all (Heitz, Hill and McGuire,
 //! "Combining Analytic Direct Illumination and Stochastic Shadows", I3D 2018).
 
-use geometry::emitter::{EmitterKind, Group, LightSample};
+use geometry::emitter::{EmitterKind, Group, LightSample, SeenLight};
 use geometry::sampling::Rng;
-use geometry::{Rgb, Surface, Vec3, World};
+use geometry::{Outlook, Rgb, Surface, Vec3, World};
 
 /// Up to so many lights are looked at one by one; more are put into as many groups at most.
 const FEW: usize = 32;
@@ -64,8 +64,10 @@ fn place_of(k: u32, times: u32, turn: u32, places: u32) -> usize {
 
 /// Which lights are sampled at a point, how often.
 #[derive(Debug, Default)]
-pub struct Plan {
+pub struct Plan<'a> {
     entries: Vec<Entry>,
+    /// The sky, if there is one.
+    sky: Option<SeenLight<'a>>,
     /// Samples drawn from the entries that share them.
     pool: u32,
 }
@@ -81,9 +83,11 @@ struct Entry {
     irradiance: f32,
 }
 
-impl Plan {
+impl<'a> Plan<'a> {
     /// Divides `samples` among the lights as they would shine on `p` with normal `n` if nothing stood between.
-    pub fn new(world: &World, p: Vec3, n: Vec3, samples: u32) -> Plan {
+    ///
+    /// - `outlook`: through which windows the sky is looked for.
+    pub fn new(world: &'a World, outlook: Option<&'a Outlook>, p: Vec3, n: Vec3, samples: u32) -> Plan<'a> {
         if world.emitters.is_empty() || samples == 0 {
             return Plan::default();
         }
@@ -107,7 +111,8 @@ impl Plan {
             let own = (0..8).map(|k| 4u32.pow(k)).find(|&n| n as f32 >= share);
             Entry { group, samples: own.unwrap_or(samples).min(samples), chance: 1.0, irradiance }
         };
-        Plan { entries: groups.into_iter().filter(|g| g.1 > 0.0).map(entry).collect(), pool }
+        let entries = groups.into_iter().filter(|g| g.1 > 0.0).map(entry).collect();
+        Plan { entries, sky: world.emitters.sky_seen_from(outlook, p, n), pool }
     }
 
     /// Expected number of samples per solid angle (1/sr) toward `point` on the emissive `triangle`: what multiple
@@ -121,13 +126,10 @@ impl Plan {
     }
 
     /// As [`Plan::density`], toward the sky.
-    pub fn density_sky(&self, world: &World, p: Vec3, n: Vec3, wi: Vec3) -> f32 {
-        let of = |e: &Entry| match e.group {
-            Group::Light(light) => e.samples as f32 * e.chance * world.emitters.pdf_of_sky(light, p, n, wi),
-            Group::Branch(_) => 0.0,
-        };
-        // The sky, when there is one, is the last light.
-        self.entries.last().map_or(0.0, of)
+    pub fn density_sky(&self, wi: Vec3) -> f32 {
+        let Some(sky) = &self.sky else { return 0.0 };
+        let entry = self.entries.iter().find(|e| e.group == Group::Light(sky.light()));
+        entry.map_or(0.0, |e| e.samples as f32 * e.chance * sky.pdf_of_sky(wi))
     }
 }
 
@@ -174,35 +176,25 @@ pub fn direct(
     // lamp from one side of the pixel alone (the worst column of a penumbra was 2.4 % of the full light off, now below 2 %).
     let turn = if spend.places.len() > 1 { rng.below(spend.places.len() as u32) } else { 0 };
     let place = |k: u32, times: u32| spend.places[place_of(k, times, turn, spend.places.len() as u32)];
-    let has_diffuse = surface.bsdf.has_diffuse();
     let (p, n) = (surface.position, surface.ns);
     for &Entry { group, samples, irradiance, .. } in plan.entries.iter().filter(|e| e.chance == 1.0) {
         let mut part = Part::default();
         let mut add = |part: &mut Part, samples: u32, sample: &dyn Fn([f32; 2]) -> Option<LightSample>| {
             for k in 0..samples {
-                match sample(stratum(k, samples, spend.phase, rng)) {
-                    Some(s) => {
-                        part.add(
-                            world,
-                            surface,
-                            wo,
-                            &s,
-                            place(k, samples),
-                            samples as f32,
-                            gloss,
-                            has_diffuse,
-                        );
-                    }
-                    None => part.count += 1,
-                }
+                let drawn = sample(stratum(k, samples, spend.phase, rng));
+                let follow = |s: LightSample| {
+                    let from = place(k, samples);
+                    (brought(world, surface, wo, &s, from, samples as f32, gloss), s.delta)
+                };
+                let (sample, delta) = drawn.map(follow).unwrap_or_default();
+                part.add(sample, delta);
             }
         };
-        let mut exact = None;
         match group {
             Group::Light(light) => {
                 let kind = &world.emitters.lights()[light as usize];
                 if let EmitterKind::Polygon(shape) = kind {
-                    exact = Some(if shape.looks_small(p, n) {
+                    part.exact = Some(if shape.looks_small(p, n) {
                         shape.irradiance(p, n)
                     } else {
                         shape.radiance * (irradiance / shape.radiance.mean())
@@ -211,30 +203,85 @@ pub fn direct(
                 let punctual = matches!(kind, EmitterKind::Punctual(_));
                 part.hard = punctual;
                 let samples = if punctual { spend.places.len() as u32 } else { samples };
-                let Some(seen) = world.emitters.seen_from(light, p, n) else { continue };
+                if !punctual {
+                    part.spread = Spread::over_grid(samples);
+                }
+                let sky = plan.sky.as_ref().filter(|sky| sky.light() == light).cloned();
+                let Some(seen) = sky.or_else(|| world.emitters.seen_from(light, p, n)) else { continue };
                 add(&mut part, samples, &|u| seen.sample(&world.scene, u));
             }
             Group::Branch(_) => {
+                part.spread = Spread::over_grid(samples);
                 add(&mut part, samples, &|u| world.emitters.sample_group(&world.scene, group, p, n, u));
             }
         }
-        part.finish(exact, &mut out);
+        part.finish(&mut out);
     }
     pooled(world, surface, wo, plan, gloss, spend.phase, &place, rng, &mut out);
+    out
+}
+
+/// What one sample of a light brings.
+#[derive(Clone, Copy, Debug, Default)]
+struct Brought {
+    /// The irradiance it stands for without and with shadows, lx.
+    open: Rgb,
+    lit: Rgb,
+    /// The radiance sent on by the diffuse lobe and by the glossy ones, cd/m².
+    diffuse: Rgb,
+    glossy: Rgb,
+}
+
+/// Follows sample `s`, one of `times`, from where it starts to the light.
+fn brought(
+    world: &World,
+    surface: &Surface,
+    wo: Vec3,
+    s: &LightSample,
+    from: Start,
+    times: f32,
+    gloss: Gloss,
+) -> Brought {
+    let mut out = Brought::default();
+    let cos = s.wi.dot(surface.ns);
+    let above = cos > 0.0 && s.wi.dot(surface.ng) > 0.0;
+    let arriving = if above { s.radiance * (cos / s.pdf) } else { Rgb::BLACK };
+    out.open = if cos > 0.0 { s.radiance * (cos / s.pdf) } else { Rgb::BLACK };
+    let seen = s.seen_from(surface.position, from.position);
+    let (shown, to_eye) = from.seen.unwrap_or((surface, wo));
+    let f_glossy = if gloss == Gloss::None { Rgb::BLACK } else { shown.bsdf.eval_glossy(to_eye, seen.wi) };
+    if arriving.is_black() && f_glossy.is_black() {
+        return out;
+    }
+    let open = world.transmittance(&seen.shadow_ray(from.position, surface.ng));
+    if open.is_black() {
+        return out;
+    }
+    out.lit = arriving * open;
+    if above && surface.bsdf.has_diffuse() {
+        out.diffuse = surface.bsdf.eval_diffuse(wo, s.wi) * out.lit;
+    }
+    if !f_glossy.is_black() {
+        let weight = match gloss {
+            Gloss::Shared if !s.delta => {
+                let light = times * s.pdf;
+                light / (light + shown.bsdf.pdf_specular(to_eye, seen.wi))
+            }
+            _ => 1.0,
+        };
+        let cos = seen.wi.dot(shown.ns).abs();
+        out.glossy = f_glossy * open * s.radiance * (cos / s.pdf * weight);
+    }
     out
 }
 
 /// Samples of one light.
 #[derive(Default)]
 struct Part {
-    count: u32,
-    /// Σ of the irradiance the samples stand for without and with shadows, and of the radiance sent on.
-    open: Rgb,
-    lit: Rgb,
-    diffuse: Rgb,
-    glossy: Rgb,
-    lit2: f32,
-    glossy2: f32,
+    sum: Brought,
+    spread: Spread,
+    /// The light's unshadowed irradiance where it has a closed form, lx.
+    exact: Option<Rgb>,
     /// A lamp without extent was among them.
     delta: bool,
     /// All are of one lamp without extent: they differ by where they start.
@@ -242,102 +289,110 @@ struct Part {
 }
 
 impl Part {
-    fn add(
-        &mut self,
-        world: &World,
-        surface: &Surface,
-        wo: Vec3,
-        s: &LightSample,
-        from: Start,
-        times: f32,
-        gloss: Gloss,
-        diffuse: bool,
-    ) {
-        self.count += 1;
-        self.delta |= s.delta;
-        let cos = s.wi.dot(surface.ns);
-        let above = cos > 0.0 && s.wi.dot(surface.ng) > 0.0;
-        let arriving = if above { s.radiance * (cos / s.pdf) } else { Rgb::BLACK };
-        self.open += if cos > 0.0 { s.radiance * (cos / s.pdf) } else { Rgb::BLACK };
-        let seen = s.seen_from(surface.position, from.position);
-        let (shown, to_eye) = from.seen.unwrap_or((surface, wo));
-        let f_glossy =
-            if gloss == Gloss::None { Rgb::BLACK } else { shown.bsdf.eval_glossy(to_eye, seen.wi) };
-        if arriving.is_black() && f_glossy.is_black() {
-            return;
-        }
-        let open = world.transmittance(&seen.shadow_ray(from.position, surface.ng));
-        if open.is_black() {
-            return;
-        }
-        let lit = arriving * open;
-        self.lit += lit;
-        self.lit2 += lit.luminance() * lit.luminance();
-        if diffuse && above {
-            self.diffuse += surface.bsdf.eval_diffuse(wo, s.wi) * lit;
-        }
-        if !f_glossy.is_black() {
-            let weight = match gloss {
-                Gloss::Shared if !s.delta => {
-                    let light = times * s.pdf;
-                    light / (light + shown.bsdf.pdf_specular(to_eye, seen.wi))
-                }
-                _ => 1.0,
-            };
-            let cos = seen.wi.dot(shown.ns).abs();
-            let sent = f_glossy * open * s.radiance * (cos / s.pdf * weight);
-            self.glossy += sent;
-            self.glossy2 += sent.luminance() * sent.luminance();
-        }
+    /// - `delta`: whether it is of a lamp without extent.
+    fn add(&mut self, sample: Brought, delta: bool) {
+        let Brought { open, lit, diffuse, glossy } = sample;
+        self.delta |= delta;
+        self.sum.open += open;
+        self.sum.lit += lit;
+        self.sum.diffuse += diffuse;
+        self.sum.glossy += glossy;
+        // How the diffuse light of these two varies is known better.
+        let unknown = if self.exact.is_some() || self.hard { glossy } else { diffuse + glossy };
+        self.spread.add(unknown.luminance());
     }
 
     /// Adds the light's part to `out`; with the `exact` unshadowed irradiance the samples only give ratios.
-    fn finish(&self, exact: Option<Rgb>, out: &mut Direct) {
-        if self.count == 0 {
+    fn finish(&self, out: &mut Direct) {
+        let Part { sum, exact, .. } = self;
+        if self.spread.count == 0 {
             return;
         }
-        let n = self.count as f32;
-        let estimate = self.open.luminance() / n;
+        let n = self.spread.count as f32;
+        let estimate = sum.open.luminance() / n;
         // How far the samples' own unshadowed light is off, corrected in the shadowed light too.
         let ratio = match exact {
             Some(e) if estimate > 0.0 => e.luminance() / estimate,
             _ => 1.0,
         };
-        let lit = self.lit * (ratio / n);
-        let sent = self.diffuse * (ratio / n);
+        let lit = sum.lit * (ratio / n);
+        let sent = sum.diffuse * (ratio / n);
         out.irradiance += lit;
         if self.hard {
             out.hard += lit;
         }
         out.diffuse += sent;
-        out.glossy += self.glossy / n;
-        if self.count > 1 {
-            let mean = self.glossy.luminance() / n;
-            let variance = (self.glossy2 / n - mean * mean).max(0.0) / (n - 1.0);
-            *(if self.hard { &mut out.hard_variance } else { &mut out.variance }) += variance;
+        out.glossy += sum.glossy / n;
+        let variance = if self.hard { &mut out.hard_variance } else { &mut out.variance };
+        if let Some(spread) = self.spread.variance() {
+            *variance += spread / n;
         } else if !self.delta {
             // A single sample in a narrow lobe is mostly nothing, and seldom very much: taken for exact it left a lone
-            // pixel on the gallery's lamp that alone made 60 % of the picture's squared error.
-            out.variance += self.glossy2;
+            // pixel on the gallery's lamp that alone made 60 % of the picture's squared error. Of the diffuse light it
+            // says nothing, and that of a lamp without extent it gives exactly.
+            *variance += sum.glossy.luminance().powi(2);
         }
-        let shadow = |v: f32| {
+        let known = self.hard && n > 1.0 || exact.is_some() && estimate > 0.0;
+        if known {
             // Seen or not seen, as a coin with the visible share v. Where an edge crosses a grid of n strata only those
             // it cuts vary, about √(4 v (1 − v) n) of them by a sixth each: variance ∝ n^-1.5.
+            let v = (lit.luminance() / (estimate * ratio).max(1e-30)).clamp(0.0, 1.0);
             let open = sent.luminance() / v.max(0.05);
-            open * open * (v * (1.0 - v)).sqrt() / 3.0 / (n * n.sqrt())
-        };
-        let v = (lit.luminance() / (estimate * ratio).max(1e-30)).clamp(0.0, 1.0);
-        if let (Some(_), true) = (exact, estimate > 0.0) {
-            out.variance += shadow(v);
-        } else if self.hard && self.count > 1 {
-            out.hard_variance += shadow(v);
-        } else if self.count > 1 {
-            let mean = self.lit.luminance() / n;
-            let spread = (self.lit2 / n - mean * mean).max(0.0) / (n - 1.0);
-            out.variance += spread * (sent.luminance() / lit.luminance().max(1e-20)).powi(2);
-        } else {
-            // One sample of a lamp without extent is exact, and one sample of anything else says nothing of its spread.
+            *variance += open * open * (v * (1.0 - v)).sqrt() / 3.0 / (n * n.sqrt());
         }
+    }
+}
+
+/// How much numbers that are added in turn vary, as far as the strata that they are drawn from do not explain it.
+#[derive(Debug, Default)]
+struct Spread {
+    /// Strata along each side of their grid, which the numbers follow row by row; less than two: in no order.
+    side: usize,
+    count: usize,
+    sum: f32,
+    /// Of their squares; in a grid of the squared differences in it.
+    squares: f32,
+    /// The last of each column, and what stood in the column before until this row.
+    above: Vec<f32>,
+    corner: f32,
+}
+
+impl Spread {
+    /// Of `n` numbers, one from each stratum of a square grid.
+    fn over_grid(n: u32) -> Spread {
+        let side = n.isqrt() as usize;
+        Spread { side, above: vec![0.0; side], ..Spread::default() }
+    }
+
+    fn add(&mut self, x: f32) {
+        self.sum += x;
+        if self.side < 2 {
+            self.squares += x * x;
+        } else {
+            let (row, column) = (self.count / self.side, self.count % self.side);
+            let over = std::mem::replace(&mut self.above[column], x);
+            if row > 0 && column > 0 {
+                let mixed = x - self.above[column - 1] - over + self.corner;
+                self.squares += mixed * mixed;
+            }
+            self.corner = over;
+        }
+        self.count += 1;
+    }
+
+    /// Variance of one number, that of the mean times how many there are; `None` of a single one.
+    ///
+    /// In a grid, a quarter of the squared mixed difference of each 2 × 2 strata: of independent numbers it holds the
+    /// variance of four, of a slope or an edge along the grid nothing, of an edge across it what the strata vary that it
+    /// cuts (for one dimension von Neumann, 1941; Immerkær, CVIU 64(2), 1996, takes the same twice over).
+    fn variance(&self) -> Option<f32> {
+        let n = self.count as f32;
+        if self.side >= 2 {
+            let blocks = (self.side - 1) as f32;
+            return Some(0.25 * self.squares / (blocks * blocks));
+        }
+        let mean = self.sum / n;
+        (self.count > 1).then(|| (self.squares / n - mean * mean).max(0.0) * n / (n - 1.0))
     }
 }
 
@@ -365,24 +420,15 @@ fn pooled<'a>(
         });
         let Some(&Entry { group, chance, .. }) = chosen.or_else(|| small().next_back()) else { return };
         let u = [rng.f32(), rng.f32()];
-        match world.emitters.sample_group(&world.scene, group, surface.position, surface.ns, u) {
-            Some(s) => {
-                let s = LightSample { pdf: s.pdf * chance, ..s };
-                part.add(
-                    world,
-                    surface,
-                    wo,
-                    &s,
-                    place(k, plan.pool),
-                    plan.pool as f32,
-                    gloss,
-                    surface.bsdf.has_diffuse(),
-                );
-            }
-            None => part.count += 1,
-        }
+        let drawn = world.emitters.sample_group(&world.scene, group, surface.position, surface.ns, u);
+        let follow = |s: LightSample| {
+            let s = LightSample { pdf: s.pdf * chance, ..s };
+            (brought(world, surface, wo, &s, place(k, plan.pool), plan.pool as f32, gloss), s.delta)
+        };
+        let (sample, delta) = drawn.map(follow).unwrap_or_default();
+        part.add(sample, delta);
     }
-    part.finish(None, out);
+    part.finish(out);
 }
 
 /// Sample `k` of `n` in [0, 1)², n a power of four: each in a stratum of its own. Of an 8 × 8 grid of strata a pixel of
@@ -427,6 +473,54 @@ mod tests {
             }
             assert_eq!(rows, [1; 64]);
             assert!(quarters.iter().all(|&n| (12..=20).contains(&n)), "{quarters:?}");
+        }
+    }
+
+    #[test]
+    fn a_grid_tells_noise_from_what_its_strata_explain() {
+        let of = |x: &dyn Fn(usize, usize) -> f32| {
+            let mut spread = Spread::over_grid(64);
+            (0..64).for_each(|k| spread.add(x(k / 8, k % 8)));
+            spread.variance().expect("64 of them")
+        };
+        // Slopes and edges along the grid.
+        let even = of(&|row, column| (row * row) as f32 + if column > 4 { 100.0 } else { 0.0 });
+        assert!(even < 1e-6, "{even}");
+        let noise: Vec<f32> = (0..2000 * 64)
+            .map({
+                let mut rng = Rng::new(1, 2);
+                move |_| rng.f32()
+            })
+            .collect();
+        let told: f32 = noise.chunks(64).map(|grid| of(&|row, column| grid[8 * row + column])).sum();
+        // A uniform number has a variance of 1/12; the overlap of the blocks leaves of their 98 000 squares some 8000.
+        assert!((told / 2000.0 * 12.0 - 1.0).abs() < 0.05, "{told}");
+        assert!(Spread::default().variance().is_none());
+    }
+
+    /// A lamp behind a round hole: the variance that is told, beside that of the means.
+    #[test]
+    fn a_grid_of_shadow_rays_tells_how_far_its_mean_is_off() {
+        let mut rng = Rng::new(5, 6);
+        for (n, independent) in [(64, 1.0), (256, 3.0), (1024, 6.0)] {
+            let (mut told, mut mean, mut square) = (0.0, 0.0, 0.0);
+            let times = 4000;
+            for _ in 0..times {
+                let mut spread = Spread::over_grid(n);
+                for k in 0..n {
+                    let [x, y] = stratum(k, n, 0, &mut rng);
+                    spread.add(if (x - 0.43).hypot(y - 0.55) < 0.3 { 1.0 } else { 0.0 });
+                }
+                let m = f64::from(spread.sum) / f64::from(n);
+                told += f64::from(spread.variance().expect("many")) / f64::from(n * times);
+                mean += m / f64::from(times);
+                square += m * m / f64::from(times);
+            }
+            let true_variance = square - mean * mean;
+            let v = mean * (1.0 - mean) / f64::from(n);
+            // An edge across the grid is told as up to twice what it is; see [`Spread::variance`].
+            assert!((0.8..2.0).contains(&(told / true_variance)), "{n}: {told} {true_variance}");
+            assert!(v > independent * told, "{n}: independent rays would leave {v}, not {told}");
         }
     }
 

@@ -149,13 +149,26 @@ impl Emitters {
             EmitterKind::Polygon(shape) => SeenKind::Surface(shape.seen_from(p)?, false),
             EmitterKind::Textured(shape) => SeenKind::Surface(shape.seen_from(p)?, true),
             EmitterKind::Punctual(lamp) => SeenKind::Lamp(lamp),
-            EmitterKind::Sky(sky) => SeenKind::Sky(self.seen_sky(sky, p, n)),
+            EmitterKind::Sky(sky) => SeenKind::Sky(SeenSky::new(sky, self.outlook(), p, n)),
         };
         Some(SeenLight { kind, light, p })
     }
 
-    fn seen_sky<'a>(&'a self, sky: &'a Sky, p: Vec3, n: Vec3) -> SeenSky<'a> {
-        SeenSky::new(sky, self.outlook.as_deref(), p, n)
+    /// Through which windows the sky is seen, where that is known.
+    pub fn outlook(&self) -> Option<&Outlook> {
+        self.outlook.as_deref()
+    }
+
+    /// The sky as [`Emitters::seen_from`] gives it, but by what `outlook` knows of the windows; `None` without one.
+    pub fn sky_seen_from<'a>(
+        &'a self,
+        outlook: Option<&'a Outlook>,
+        p: Vec3,
+        n: Vec3,
+    ) -> Option<SeenLight<'a>> {
+        let light = self.lights.len().checked_sub(1)?;
+        let EmitterKind::Sky(sky) = &self.lights[light] else { return None };
+        Some(SeenLight { kind: SeenKind::Sky(SeenSky::new(sky, outlook, p, n)), light: light as u32, p })
     }
 
     /// A way from `p` with unit normal `n`, or zero, to one given light, the pdf without the probability of choosing that
@@ -174,7 +187,7 @@ impl Emitters {
     /// The density (1/sr) with which [`Emitters::sample_light`] draws the unit direction `wi` of the sky, if `light` is one.
     pub fn pdf_of_sky(&self, light: u32, p: Vec3, n: Vec3, wi: Vec3) -> f32 {
         match self.lights.get(light as usize) {
-            Some(EmitterKind::Sky(sky)) => self.seen_sky(sky, p, n).pdf(wi),
+            Some(EmitterKind::Sky(sky)) => SeenSky::new(sky, self.outlook(), p, n).pdf(wi),
             _ => 0.0,
         }
     }
@@ -212,6 +225,19 @@ enum SeenKind<'a> {
 }
 
 impl SeenLight<'_> {
+    /// Which one.
+    pub fn light(&self) -> u32 {
+        self.light
+    }
+
+    /// The density (1/sr) with which [`SeenLight::sample`] draws the unit direction `wi` of the sky; 0 of other lights.
+    pub fn pdf_of_sky(&self, wi: Vec3) -> f32 {
+        match &self.kind {
+            SeenKind::Sky(sky) => sky.pdf(wi),
+            _ => 0.0,
+        }
+    }
+
     /// A way to the light, the pdf without the probability of choosing it; `u` in [0, 1)². `None` where it sends none.
     #[inline]
     pub fn sample(&self, scene: &Scene, u: [f32; 2]) -> Option<LightSample> {

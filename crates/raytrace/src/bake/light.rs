@@ -61,7 +61,8 @@ impl<'a> Lamp<'a> {
     /// - `shadow`: shadow rays of each look.
     pub fn new(world: &'a World, solution: &'a Solution, shadow: u32) -> Lamp<'a> {
         let gathers = FinalGather::new(GATHER_RAYS, DOUBTED, solution.report.mean.mean());
-        let by_vertices = Hybrid { world, solution, mode: DiffuseMode::Split, gathers };
+        let outlook = world.emitters.outlook();
+        let by_vertices = Hybrid { world, solution, outlook, mode: DiffuseMode::Split, gathers };
         let by_rays = Hybrid { mode: DiffuseMode::Gather, ..by_vertices.clone() };
         Lamp { by_vertices, by_rays, shadow }
     }
@@ -109,7 +110,7 @@ impl<'a> Lamp<'a> {
         Spot { surface, base, alpha, emission, known, translucent }
     }
 
-    fn shine(&self, spot: &Spot, rng: &mut Rng) -> (Diffuse, Plan) {
+    fn shine(&self, spot: &Spot, rng: &mut Rng) -> (Diffuse, Plan<'_>) {
         let hybrid = if spot.known { &self.by_vertices } else { &self.by_rays };
         let quality = Quality { shadow: self.shadow, gather: Gather::Worth(1.0), photons: Photons::Always };
         let phase = rng.below(16);

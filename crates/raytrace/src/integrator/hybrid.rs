@@ -13,7 +13,7 @@ use geometry::bsdf::BsdfSample;
 use geometry::dispersion::Hue;
 use geometry::math::{offset_origin, to_world};
 use geometry::sampling::{Lattice2, Rng, cosine_hemisphere};
-use geometry::{Hit, Passage, Ray, Rgb, Surface, Vec3, World, photometry};
+use geometry::{Hit, Outlook, Passage, Ray, Rgb, Surface, Vec3, World, photometry};
 use radiosity::Solution;
 use radiosity::element::Side;
 use radiosity::gather::{self, ROUGH};
@@ -97,6 +97,8 @@ pub struct Hybrid<'a> {
     pub world: &'a World,
     /// The prepass over it.
     pub solution: &'a Solution,
+    /// Through which windows the sky is seen, where that is known.
+    pub outlook: Option<&'a Outlook>,
     /// Where a diffuse surface's light comes from.
     pub mode: DiffuseMode,
     /// What surfaces may spend on gathers of their own.
@@ -142,7 +144,7 @@ impl Hybrid<'_> {
         phase: u32,
         places: &[Start],
         rng: &mut Rng,
-    ) -> (Diffuse, Plan) {
+    ) -> (Diffuse, Plan<'_>) {
         let (mut out, plan) = self.diffuse_of_side(surface, wo, quality, phase, places, rng);
         if let Some(turned) = surface.turned() {
             let gather = match quality.gather {
@@ -170,8 +172,8 @@ impl Hybrid<'_> {
         phase: u32,
         places: &[Start],
         rng: &mut Rng,
-    ) -> (Diffuse, Plan) {
-        let plan = Plan::new(self.world, surface.position, surface.ns, quality.shadow);
+    ) -> (Diffuse, Plan<'_>) {
+        let plan = Plan::new(self.world, self.outlook, surface.position, surface.ns, quality.shadow);
         let gloss = gloss_of(surface, wo);
         let has_diffuse = surface.bsdf.has_diffuse();
         let from_vertices = self.mode == DiffuseMode::Vertex && has_diffuse;
@@ -403,7 +405,7 @@ impl Hybrid<'_> {
         let Some(hit) = self.world.closest(&ray) else {
             let Some(sky) = &self.world.scene.sky else { return Rgb::BLACK };
             let share = from.map_or(1.0, |f| {
-                let by_light = f.plan.density_sky(self.world, f.position, f.normal, ray.direction);
+                let by_light = f.plan.density_sky(ray.direction);
                 f.pdf / (f.pdf + by_light)
             });
             return sky.radiance(ray.direction) * share;
@@ -540,7 +542,7 @@ impl Strand {
 struct From<'a> {
     position: Vec3,
     normal: Vec3,
-    plan: &'a Plan,
+    plan: &'a Plan<'a>,
     pdf: f32,
 }
 

@@ -146,7 +146,8 @@ impl<'a> Meter<'a> {
     /// Adds the estimates of these numbers to what is known at a sensor.
     fn add(&self, sensor: &Sensor, stream: u64, numbers: std::ops::Range<u32>, tally: &mut Tally) {
         let sheet = Surface::white_sheet(sensor.position, sensor.normal);
-        let plan = Plan::new(self.world, sensor.position, sensor.normal, SHADOW_RAYS);
+        let plan =
+            Plan::new(self.world, self.world.emitters.outlook(), sensor.position, sensor.normal, SHADOW_RAYS);
         for number in numbers {
             let mut rng = Rng::new(self.seed ^ 0x006d_6574_6572, (stream << 12) | u64::from(number));
             let (one, found) = self.estimate(sensor, &sheet, &plan, &mut rng);
