@@ -19,6 +19,11 @@ pub const ROUGH: f32 = 0.16;
 /// Surfaces that one ray meets at most before it is dropped: pass-throughs, mirrors and glass.
 const LONGEST: usize = 32;
 
+/// Looks at each kind of light from where a gather ray lands, where there is more than one lamp to choose from, or a sky behind
+/// windows: a look is cheaper than another ray, and says less. In six rooms two of them leave 3 to 7 % less error in 0.9 to 1.1
+/// times the time, four 10 % less in 1.2 times.
+const LOOKS: u32 = 2;
+
 /// What came of one ray.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Followed {
@@ -127,8 +132,8 @@ pub fn follow(
     out
 }
 
-/// Radiance toward `wo` of one light sample of each kind at `surface`, and the light: its diffuse lobe times `diffuse`, and
-/// its glossy lobe if asked.
+/// Radiance toward `wo` of the light samples of each kind at `surface`, and their lights: the diffuse lobe times `diffuse`, and
+/// the glossy lobe if asked.
 fn lamps_through(
     world: &World,
     surface: &Surface,
@@ -138,8 +143,12 @@ fn lamps_through(
     rng: &mut Rng,
     mut each: impl FnMut(u32, Rgb),
 ) {
-    for kind in 0..world.emitters.kinds() {
-        let u = [rng.f32(), rng.f32(), rng.f32()];
+    let looks = if world.emitters.is_one_lamp() { 1 } else { LOOKS };
+    for (kind, look) in (0..world.emitters.kinds()).flat_map(|kind| (0..looks).map(move |look| (kind, look)))
+    {
+        // Each look draws among its share of the lamps. Where on them is left to chance: shares of that as well, hand in hand with
+        // the others, would leave out some parts of some lamps (a furnace came out 0.5 % too bright).
+        let u = [(look as f32 + rng.f32()) / looks as f32, rng.f32(), rng.f32()];
         let sample = world.emitters.sample_kind(&world.scene, kind, surface.position, surface.ns, u);
         let Some(light) = sample else { continue };
         let cos = light.wi.dot(surface.ns);
@@ -151,7 +160,7 @@ fn lamps_through(
         if glossy {
             f += surface.bsdf.eval_glossy(wo, light.wi);
         }
-        let brought = f * light.radiance * (cos.abs() / light.pdf);
+        let brought = f * light.radiance * (cos.abs() / light.pdf / looks as f32);
         if brought.max_channel() > 0.0 && brought.is_finite() {
             each(light.light, brought * world.transmittance(&light.shadow_ray(surface.position, surface.ng)));
         }

@@ -16,9 +16,6 @@ const SPECULAR_COST: f32 = 8.0;
 const FEW: usize = 5000;
 /// An edge through a jittered grid of n leaves a variance ∝ n^-1.5.
 const EDGE_POWER: f32 = 1.5;
-/// Shadow rays leave between what independent rays do, n^-1, and what an edge across their strata does, n^-1.5. With 1 rooms by
-/// day take a thirtieth more rays.
-const LIGHT_POWER: f32 = 1.25;
 /// A redone pixel gets so many times the samples at most: an estimate from few samples may be far off.
 const LEAP: u32 = 16;
 
@@ -135,7 +132,7 @@ pub fn next(shots: &[Option<Shot>], noise: &[Noise], budget: &Budget) -> Vec<(u3
             let (power, cost) = if shot.specular { (1.0, SPECULAR_COST) } else { (EDGE_POWER, 1.0) };
             [
                 stock(noise[i].camera, camera, budget.most_camera, power, cost),
-                stock(noise[i].light, shadow, budget.most_shadow, LIGHT_POWER, 1.0),
+                stock(noise[i].light, shadow, budget.most_shadow, 1.0, 1.0),
             ]
         })
     };

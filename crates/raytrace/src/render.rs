@@ -103,7 +103,8 @@ const PIXELS_OF_A_SITE: usize = 2;
 /// Sites it may have at least: what is not seen lights what is.
 const LEAST_SITES: usize = 16_000;
 /// Of the square of the error asked, the share that samples may leave as noise; the rest is for the first pass.
-const NOISE_SHARE: f32 = 0.5;
+/// With 0.5 a furnished room at 5 % takes 0.91 of the rays and is off by 5.46 instead of 5.14 %.
+const NOISE_SHARE: f32 = 0.4;
 /// What the first pass is asked for, in units of the error asked.
 const MESH_SHARE: f32 = 0.85;
 /// Rays through one pixel, and shadow rays for one surface, at most: the edge of a lamp before a dark wall wants many.

@@ -154,6 +154,11 @@ impl Emitters {
         Some(SeenLight { kind, light, p })
     }
 
+    /// Whether all light comes from one surface or lamp.
+    pub fn is_one_lamp(&self) -> bool {
+        matches!(&self.lights[..], [light] if !matches!(light, EmitterKind::Sky(_)))
+    }
+
     /// Through which windows the sky is seen, where that is known.
     pub fn outlook(&self) -> Option<&Outlook> {
         self.outlook.as_deref()
