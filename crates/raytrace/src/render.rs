@@ -345,7 +345,8 @@ fn two_passes(
 /// Through which windows what `view` shows sees the sky; `None` where none is known. By what the world knows of itself pictures
 /// of rooms by day take a tenth more rays.
 fn windows(world: &World, view: &View) -> Option<Outlook> {
-    let outlook = world.emitters.outlook()?;
+    let sky = world.scene.sky.as_ref().filter(|sky| !sky.mean().is_black());
+    let outlook = sky.and(world.emitters.outlook())?;
     let aspect = view.width as f32 / view.height.max(1) as f32;
     let points = importance(world, std::slice::from_ref(view.camera), aspect).points;
     let mesh = &world.scene.mesh;
