@@ -127,9 +127,13 @@ impl<'a> Plan<'a> {
 
     /// As [`Plan::density`], toward the sky.
     pub fn density_sky(&self, wi: Vec3) -> f32 {
-        let Some(sky) = &self.sky else { return 0.0 };
-        let entry = self.entries.iter().find(|e| e.group == Group::Light(sky.light()));
-        entry.map_or(0.0, |e| e.samples as f32 * e.chance * sky.pdf_of_sky(wi))
+        let of = |e: &Entry| Some(e.samples as f32 * e.chance * self.sky_of(e.group)?.pdf_of_sky(wi));
+        self.entries.iter().find_map(of).unwrap_or(0.0)
+    }
+
+    /// The sky, if `group` is it: drawn by the windows of this plan in all places.
+    fn sky_of(&self, group: Group) -> Option<&SeenLight<'a>> {
+        self.sky.as_ref().filter(|sky| group == Group::Light(sky.light()))
     }
 }
 
@@ -206,7 +210,7 @@ pub fn direct(
                 if !punctual {
                     part.spread = Spread::over_grid(samples);
                 }
-                let sky = plan.sky.as_ref().filter(|sky| sky.light() == light).cloned();
+                let sky = plan.sky_of(group).cloned();
                 let Some(seen) = sky.or_else(|| world.emitters.seen_from(light, p, n)) else { continue };
                 add(&mut part, samples, &|u| seen.sample(&world.scene, u));
             }
@@ -420,7 +424,10 @@ fn pooled<'a>(
         });
         let Some(&Entry { group, chance, .. }) = chosen.or_else(|| small().next_back()) else { return };
         let u = [rng.f32(), rng.f32()];
-        let drawn = world.emitters.sample_group(&world.scene, group, surface.position, surface.ns, u);
+        let drawn = match plan.sky_of(group) {
+            Some(sky) => sky.sample(&world.scene, u),
+            None => world.emitters.sample_group(&world.scene, group, surface.position, surface.ns, u),
+        };
         let follow = |s: LightSample| {
             let s = LightSample { pdf: s.pdf * chance, ..s };
             (brought(world, surface, wo, &s, place(k, plan.pool), plan.pool as f32, gloss), s.delta)
