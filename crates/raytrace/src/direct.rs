@@ -17,11 +17,9 @@ const OWN: f32 = 0.04;
 /// white dots in a furnace).
 const EVEN: f32 = 0.2;
 
-/// How many rays to spend, and which strata this pixel takes of the pattern that its neighbours complete.
+/// Which strata this pixel takes of the pattern that its neighbours complete, and where its rays start.
 #[derive(Clone, Copy, Debug)]
 pub struct Spend<'a> {
-    /// Shadow rays for a light that brings all of the light: a power of four.
-    pub samples: u32,
     /// Place in the 4 × 4 block of pixels, 0 … 15.
     pub phase: u32,
     /// Where shadow rays start from in turn, at least one place: the edge of a shadow may run through the pixel.
@@ -87,10 +85,13 @@ impl<'a> Plan<'a> {
     /// Divides `samples` among the lights as they would shine on `p` with normal `n` if nothing stood between.
     ///
     /// - `outlook`: through which windows the sky is looked for.
+    /// - `samples`: shadow rays for a light that brings all of the light; of these the power of four next below, for their
+    ///   strata fill a square.
     pub fn new(world: &'a World, outlook: Option<&'a Outlook>, p: Vec3, n: Vec3, samples: u32) -> Plan<'a> {
         if world.emitters.is_empty() || samples == 0 {
             return Plan::default();
         }
+        let samples = 4u32.pow(samples.ilog(4));
         let groups = world.emitters.groups(p, n, FEW);
         let total: f32 = groups.iter().map(|g| g.1).sum();
         if total <= 0.0 {
@@ -463,6 +464,7 @@ fn stratum(k: u32, n: u32, phase: u32, rng: &mut Rng) -> [f32; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use geometry::{Scene, Sky};
 
     #[test]
     fn places_are_taken_in_turn_or_spread_over_the_pixel() {
@@ -480,6 +482,17 @@ mod tests {
             }
             assert_eq!(rows, [1; 64]);
             assert!(quarters.iter().all(|&n| (12..=20).contains(&n)), "{quarters:?}");
+        }
+    }
+
+    /// Eight in a grid of two columns would stand in four rows, two of them beyond its edge.
+    #[test]
+    fn samples_fill_a_square() {
+        let scene = Scene { sky: Some(Sky::Constant(Rgb::WHITE)), ..Scene::default() };
+        let world = World::new(scene);
+        for (asked, taken) in [(1, 1), (3, 1), (4, 4), (8, 4), (16, 16), (1000, 256)] {
+            let plan = Plan::new(&world, None, Vec3::ZERO, Vec3::Y, asked);
+            assert_eq!(plan.entries.iter().map(|e| e.samples).collect::<Vec<_>>(), [taken]);
         }
     }
 

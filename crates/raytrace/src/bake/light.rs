@@ -127,8 +127,7 @@ impl<'a> Lamp<'a> {
     /// The light of the lamps alone, once more.
     fn straight(&self, spot: &Spot, plan: &Plan, rng: &mut Rng) -> Rgb {
         let (world, surface) = (self.by_vertices.world, &spot.surface);
-        let spend =
-            Spend { samples: self.shadow, phase: rng.below(16), places: &[Start::at(surface.position)] };
+        let spend = Spend { phase: rng.below(16), places: &[Start::at(surface.position)] };
         direct(world, surface, surface.ng, plan, Gloss::None, spend, rng).diffuse
     }
 

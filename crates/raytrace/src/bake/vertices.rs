@@ -20,7 +20,7 @@ use std::collections::HashMap;
 /// Samples of one side of an element at least, one in each quarter of it.
 const SAMPLES: u32 = 4;
 /// Shadow rays of each of a sample's two looks: some eight samples make up a vertex.
-const SHADOW_RAYS: u32 = 8;
+const SHADOW_RAYS: u32 = 4;
 /// Rounds of refinement at most; each halves the edges of the worst elements.
 const ROUNDS: u32 = 7;
 /// Shortest edge that refinement splits, in units of the rooms' size.

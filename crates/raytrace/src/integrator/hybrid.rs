@@ -51,7 +51,7 @@ const UNSURE_IN_GLOSS: f32 = 0.4;
 /// How much to spend on one surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Quality {
-    /// Shadow rays: see [`Spend`].
+    /// Shadow rays: see [`Plan::new`].
     pub shadow: u32,
     /// Whether to gather at the surface, where the mode or doubt of the mesh asks for it: for what the eye sees directly.
     pub gather: Gather,
@@ -180,15 +180,7 @@ impl Hybrid<'_> {
         let lit = if from_vertices && gloss == Gloss::None {
             Direct::default()
         } else if has_diffuse || gloss != Gloss::None {
-            direct(
-                self.world,
-                surface,
-                wo,
-                &plan,
-                gloss,
-                Spend { samples: quality.shadow, phase, places },
-                rng,
-            )
+            direct(self.world, surface, wo, &plan, gloss, Spend { phase, places }, rng)
         } else {
             Direct::default()
         };

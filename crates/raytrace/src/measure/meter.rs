@@ -177,7 +177,7 @@ impl<'a> Meter<'a> {
     /// One estimate, and the number of rays that ran into an emitter by way of mirrors and glass.
     fn estimate(&self, sensor: &Sensor, sheet: &Surface, plan: &Plan, rng: &mut Rng) -> (Reading, u32) {
         let Sensor { position, normal, .. } = *sensor;
-        let spend = Spend { samples: SHADOW_RAYS, phase: rng.below(16), places: &[Start::at(position)] };
+        let spend = Spend { phase: rng.below(16), places: &[Start::at(position)] };
         let straight = direct(self.world, sheet, normal, plan, Gloss::None, spend, rng);
         let mut out = Reading { direct: straight.irradiance, ..Reading::default() };
         let mut found = 0;
